@@ -10,6 +10,8 @@ RolloverRule = Literal["shortest", "sign", "none"]
 """which path the control takes to a word of a modulo axis"""
 Park = Literal["turn", "home"]
 """where an axis without end stops is parked"""
+SplineBlocks = Literal["poly", "bspline"]
+"""by which a control runs splines"""
 BoughtOption = Literal["tilted_planes", "tip_control", "smoothing", "rigid_tapping", "helical", "splines"]
 """option of a control that a shop has bought or not"""
 Rapids = Literal["straight", "dog-leg"]

@@ -16,20 +16,22 @@ Limit = Annotated[float, Field(gt=0.0, le=1e12)]
 MassCentre = tuple[Annotated[float, Field(ge=-1e6, le=1e6)], Annotated[float, Field(ge=-1e6, le=1e6)],
               Annotated[float, Field(ge=-1e6, le=1e6)]]
 Inertia = Amount | tuple[Amount, Amount, Amount]
-MassFigure = Literal["mass", "centre", "inertia", "rotor", "force", "balance", "rods", "joint", "length"]
+MassFigure = Literal["mass", "centre", "inertia", "rotor", "force", "balance", "friction", "viscous", "rods", "joint",
+                     "length"]
 StiffnessFigure = Literal["rod", "joint", "drive", "turn"]
 BodyFigure = Literal["mass", "centre", "inertia"]
 
 
 class BodyModel(UserModel):
-    """`[dynamics.platform]` or `[dynamics.head]`: a body of a machine on legs."""
+    """`[dynamics.platform]`, `head`, `part` or `tool`: a body that no axis has in its own table."""
 
     mass: Amount
-    """kg, the spindle of the platform included; of a platform that carries a rotary axis without what that axis turns"""
+    """kg; of a platform with its spindle, without what a rotary axis that it carries turns"""
     centre: MassCentre = (0.0, 0.0, 0.0)
-    """mm, its centre of mass from the reference point of the level platform, axes at 0"""
+    """mm, its centre of mass, all axes at 0: of platform and head from the reference point of the level platform, of the
+    part in the frame of the table that carries it, of the tool from the gauge point, along the machine's x, y and z"""
     inertia: Inertia = 0.0
-    """kg m2 about its centre of mass: one number, or three about the x, y and z of the level platform"""
+    """kg m2 about its centre of mass: one number, or three about the same x, y and z"""
     assumed: tuple[BodyFigure, ...] = ()
     """keys of this table whose figure no document states"""
     source: dict[BodyFigure, FigureSource] = Field(default_factory=dict)
@@ -43,7 +45,8 @@ class AxisMassModel(UserModel):
     """kg of the body that this axis moves and no axis beyond it: slide, table, head, carriage, arm; of a leg of changing
     length the part that turns about the foot"""
     centre: MassCentre | None = None
-    """mm, its centre of mass in machine coordinates, all axes at 0; left out: on the line of a rotary axis or an arm's"""
+    """mm, its centre of mass in machine coordinates, all axes at 0 (of an axis between platform and spindle from the
+    reference point of the level platform); left out: on the line of a rotary axis or an arm's"""
     inertia: Inertia = 0.0
     """kg m2 of that body about its centre of mass: one number, or three about the machine's x, y and z, all axes at 0"""
     rotor: Amount = 0.0
@@ -52,6 +55,10 @@ class AxisMassModel(UserModel):
     """N, of a rotary axis N m: what the motor can give, in both directions; left out: without limit"""
     balance: Annotated[float, Field(ge=-1e9, le=1e9)] = 0.0
     """N or N m that a counterbalance gives in the positive direction"""
+    friction: Amount = 0.0
+    """N or N m of dry friction of the drive, whatever its speed (Coulomb)"""
+    viscous: Amount = 0.0
+    """N per m/s, of a rotary axis N m per rad/s: friction of the drive in proportion to its speed"""
     rods: Amount = 0.0
     """kg of all rods of this leg, slender and even from joint to joint; of a leg of changing length from the platform joint
     on, `length` mm long"""
@@ -107,6 +114,10 @@ class DynamicsModel(UserModel):
     """of a machine on legs"""
     head: BodyModel | None = None
     """what the rotary axis between platform and spindle turns"""
+    part: BodyModel | None = None
+    """the part with its fixture, on whatever carries it"""
+    tool: BodyModel | None = None
+    """the tool with its holder, in the spindle"""
     axes: dict[str, AxisMassModel] = Field(default_factory=dict)
     """by axis letter"""
 
@@ -118,7 +129,7 @@ class DynamicsModel(UserModel):
     def figures(self) -> list[FigureTable]:
         """The tables that hold figures with a source, or assumed ones."""
         bodies = [FigureTable(("dynamics", name), body.assumed, by_key(body.source))
-                  for name, body in (("platform", self.platform), ("head", self.head)) if body is not None]
+                  for name in ("platform", "head", "part", "tool") if (body := getattr(self, name)) is not None]
         return bodies + [FigureTable(("dynamics", "axes", name), axis.assumed, by_key(axis.source))
                          for name, axis in self.axes.items()]
 
@@ -143,7 +154,7 @@ class DynamicsModel(UserModel):
                                  f"its axes are {', '.join(kinds)}")
                 continue
             yield from _stray(name, axis, kinds[name])
-            moves = axis.mass or axis.rotor or axis.rods or _inert(axis.inertia) or parts
+            moves = axis.mass or axis.rotor or axis.rods or _inert(axis.inertia) or parts or self.part or self.tool
             if axis.force is not None and not moves:
                 yield KeyProblem("machine.dynamics", ("dynamics", "axes", name), f"axis {name} has a force and moves no "
                                  "mass", "write mass, inertia or rotor")

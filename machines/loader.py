@@ -206,7 +206,7 @@ def _options(file: UserFile, control: ControlModel) -> ControlOptions:
     fitted = {name: bool(value) for name in get_args(BoughtOption) if (value := getattr(control, name)) is not None}
     origins = {name: file.origin(("control", name)) for name in fitted}
     return ControlOptions(fitted, {name: (at.file, at.line) for name, at in origins.items()}, control.tip_frame or "",
-                          control.power_on, control.settings)
+                          control.power_on, control.settings, control.splines == "bspline")
 
 
 def _cutting_velocity(model: MachineModel, kinematics: Kinematics) -> tuple[float, ...]:

@@ -86,6 +86,7 @@ class ControlOptions:
         tip_frame: "table" or "entry" as in [modes.tcp] frame, "" where the file does not say
         power_on: codes in force before every program
         settings: words of what programs rely on and the file confirms
+        control_points: splines go by their control points, not by coefficients of their pieces
     """
 
     fitted: Mapping[BoughtOption, bool] = field(default_factory=dict)
@@ -93,6 +94,7 @@ class ControlOptions:
     tip_frame: Literal["table", "entry", ""] = ""
     power_on: tuple[str, ...] = ()
     settings: tuple[str, ...] = ()
+    control_points: bool = False
 
     def absent(self, option: BoughtOption) -> bool:
         """True where the file says that the control has it not."""

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import AfterValidator, Field, PrivateAttr
 
 from machines.certificate.lookup import comes_with_package
-from machines.choices import Park, Rapids, RolloverRule, Stop
+from machines.choices import Park, Rapids, RolloverRule, SplineBlocks, Stop
 from machines.dynamics_models import DynamicsModel, StiffnessModel
 from machines.figures import Document, FigureSource, FigureTable, by_key, source_problems
 from machines.hooks import HooksModel
@@ -184,9 +184,10 @@ class ControlModel(UserModel):
     """the option of rigid tapping (Fanuc M29); false: taps need a floating holder, where the cycle allows one"""
     helical: bool | None = None
     """the option of helical interpolation; false: helices are written as lines"""
-    splines: bool | None = None
-    """the option of spline interpolation (Siemens POLY, iTNC 530 SPL): true writes splines of the CL file by it, one block
-    for each cubic; default: they are arcs and chords, and a program with such blocks is refused"""
+    splines: bool | SplineBlocks | None = None
+    """the option of spline interpolation (Siemens POLY, iTNC 530 SPL): true or "poly" writes splines of the CL file by it,
+    one block for each cubic; "bspline" by control points (Siemens BSPLINE); default: they are arcs and chords, and a program
+    with such blocks is refused"""
     tip_frame: Literal["table", "entry"] | None = None
     """what X, Y, Z are the tip in, where a rotary table stands turned when tool-centre-point control is switched on (Fanuc
     parameter 19696#5 WKP); default: as the controller file has it ([modes.tcp] frame)"""
@@ -250,7 +251,10 @@ class MachineModel(UserModel):
         rotary = dict(zip(kinematics.axis_names, kinematics.rotary, strict=True))
         axes = list(self._axis_problems(rotary)) or list(self._travel_problems(kinematics))
         yield from axes
-        if self.dynamics is not None:
+        if self.dynamics is not None and not kinematics.chain and kinematics.leg_parts is None:
+            yield KeyProblem("machine.dynamics", ("dynamics",), "masses are known of chains of axes and of platforms on "
+                             "legs that end in joints, not of this machine", "take [dynamics] out")
+        elif self.dynamics is not None:
             yield from self.dynamics.problems(*_moving_parts(kinematics))
         if self.stiffness is not None:
             yield from self.stiffness.problems(kinematics.leg_parts is not None)
@@ -325,7 +329,7 @@ def _moving_parts(kinematics: Kinematics) -> tuple[dict[str, Collection[str]], t
     for at, stretches in zip(parts.legs_at, parts.stretches, strict=True):
         found[names[at]] = ("leg", "length") if stretches else ("leg",)
     found |= {names[at]: ("carrier",) for at in parts.carriers_at}
-    return found, ("platform", "head") if parts.axis is not None and parts.axis.at_spindle else ("platform",)
+    return found, ("platform", "head") if any(axis.at_spindle for axis in parts.axes) else ("platform",)
 
 
 def blanks(numbers: Iterable[float]) -> str:

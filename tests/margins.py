@@ -5,6 +5,9 @@ By how much the lengths of tools may differ is a sixth of a conversion. It is lo
 is another sixth. It hears every conversion on every machine and control, of modes and registers of controls, of compiled
 and written programs, of jobs, hints and pages, and those that rooms share; not those of rooms which choose axes, places and
 times, look at one part of the road by other means, or write reports, nor where LinuxCNC itself reads the program.
+
+Drawings are laid out and have their full number of dots in the tests of drawings; elsewhere panels stay where the grid puts
+them, which moves no text, and are rough.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ import pytest
 from postproc.pipeline import stages
 from postproc.verification import length_limits, read_back, second_witness
 from postproc.witness.evidence import Testimony
+from toolpaths import drawing
 
 TESTS = Path(__file__).parent
 ROOMS = frozenset({TESTS / "hints", TESTS / "linuxcnc", *(TESTS / "postproc" / room for room in (
@@ -38,10 +42,19 @@ HEARD = frozenset({"test_compensation_points.py", "test_corrected_legs.py", "tes
                    "test_turning_axes.py"})
 """files of these rooms that show what it says"""
 NAME, WITNESS = "length_margins", "second_witness"
+DRAWN = frozenset({"test_drawing.py", "test_sheet.py", "test_run.py"})
+"""files that look at how drawings are laid out, and at the same bytes of processes of their own"""
+ROUGH = 40
+"""dots per inch"""
 
 
 def _none(*given: Any) -> tuple[()]:
     return ()
+
+
+def _as_put(sheet: Any) -> None:
+    """In the place of the layout that gives panels as much room as their texts need."""
+    sheet.set_layout_engine("none")
 
 
 def _silent(*given: Any) -> tuple[Testimony, list[Any]]:
@@ -50,8 +63,11 @@ def _silent(*given: Any) -> tuple[Testimony, list[Any]]:
 
 @pytest.fixture(autouse=True)
 def lengths_looked_at_where_they_are_seen(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """For every test; the second witness too."""
+    """For every test; the second witness and drawings too."""
     room, name = request.path.parent, request.path.name
+    if name not in DRAWN:
+        monkeypatch.setattr(drawing, "_settle", _as_put)
+        monkeypatch.setattr(drawing, "DOTS", ROUGH)
     if room in ROOMS and name not in SEEN:
         monkeypatch.setattr(read_back, NAME, _none)
     if room in UNHEARD and name not in HEARD:

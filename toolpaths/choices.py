@@ -14,6 +14,8 @@ GivenDialect = Literal["", DialectName]
 """asked for; "" as the file is recognised"""
 ShopName = NewType("ShopName", str)
 """under which an installed package registers a CL dialect or a CL reader"""
+CubicPieces = Literal["", "pieces", "uniform"]
+"""splines as cubics: not, piece by piece, or as cubics with equal knots"""
 FigureEnding = Literal[".png", ".svg"]
 FieldEnding = Literal[".csv", FigureEnding]
 """of a table, or of a figure"""

@@ -37,12 +37,39 @@ def moments(inertia: Inertia) -> Floats:
     return np.broadcast_to(np.asarray(inertia, dtype=np.float64), 3) * KG_M2
 
 
+@dataclass(frozen=True, eq=False)
+@arrays(rotor="J", balance="J", friction="J", viscous="J")
+class Drives:
+    """Of the motors of J axes, in kg mm/s2 and mm, of rotary axes kg mm2/s2 and rad.
+
+    Attributes:
+        rotor: (J,) inertia of motor and gear
+        balance: (J,) what counterbalances give
+        friction: (J,) dry friction, whatever the speed
+        viscous: (J,) friction per speed
+    """
+
+    rotor: Floats
+    balance: Floats
+    friction: Floats
+    viscous: Floats
+
+    def resisting(self, rate: Floats, acceleration: Floats) -> Floats:
+        """(N, J) what the motors give against friction at rates (N, J); an axis at rest that is accelerated breaks loose."""
+        way = np.sign(np.where(rate == 0.0, acceleration, rate))
+        return np.asarray(self.friction * way + self.viscous * rate, dtype=np.float64)
+
+
 class Dynamics(ABC):
     """Inverse dynamics of one machine: joints in mm and rad, forces in kg mm/s2, torques in kg mm2/s2."""
 
+    drives: Drives
+    """its motors"""
+
     @abstractmethod
     def forces(self, q: Floats, rate: Floats, acceleration: Floats, gravity: float = GRAVITY) -> Floats:
-        """(N, J) what the motors give at joints (N, J) with their rates and accelerations, counterbalances off it.
+        """(N, J) what the motors give at joints (N, J) with their rates and accelerations, counterbalances off it, without
+        friction.
 
         `gravity` mm/s2; 0: inertia alone, without gravity and counterbalances.
         """

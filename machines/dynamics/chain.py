@@ -10,10 +10,11 @@ RigidBody Dynamics Algorithms (2008), chapter 5; the same forces by a Jacobian: 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 
-from machines.dynamics.bodies import GRAVITY, Dynamics, RigidBody
+from machines.dynamics.bodies import GRAVITY, Drives, Dynamics, RigidBody
 from machines.kinematics.chain import Joint
 from toolpaths.arrays import Floats
 from toolpaths.dataclass import dataclass
@@ -23,45 +24,64 @@ from toolpaths.shapes import arrays
 
 @dataclass(frozen=True, eq=False)
 class AxisBody:
-    """One axis of a side, from the bed outwards: its joint, index in q, sense, and the body that it moves."""
+    """One axis of a side, from the bed outwards: its joint, index in q, sense, and the bodies that it moves."""
 
     joint: Joint
     at: int
     sense: float
-    body: RigidBody
+    bodies: tuple[RigidBody, ...]
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(rotor="J", balance="J", down="3")
+@arrays(turn="N 3 3", shift="N 3", omega="N 3", v="N 3", alpha="N 3", a="N 3")
+class MovingFrame:
+    """What carries a side: its frame, its motion as that of the point at the machine's origin, gravity as -a."""
+
+    turn: Floats
+    shift: Floats
+    omega: Floats
+    v: Floats
+    alpha: Floats
+    a: Floats
+
+    @classmethod
+    def bed(cls, count: int, gravity: Floats) -> Self:
+        """The bed, under `gravity` (3,)."""
+        zero = np.zeros((count, 3))
+        return cls(np.tile(np.eye(3), (count, 1, 1)), zero, zero, zero, zero, np.tile(-gravity, (count, 1)))
+
+
+@dataclass(frozen=True, eq=False)
+@arrays(down="3")
 class ChainDynamics(Dynamics):
     """Sides of a machine, each a chain from the bed outwards.
 
     Attributes:
         sides: axes of each
-        rotor: (J,) inertia of motors, kg or kg mm2
-        balance: (J,) of counterbalances, kg mm/s2 or kg mm2/s2
+        drives: the motors
         down: (3,) direction of gravity
     """
 
     sides: tuple[tuple[AxisBody, ...], ...]
-    rotor: Floats
-    balance: Floats
+    drives: Drives
     down: Floats
 
     def forces(self, q: Floats, rate: Floats, acceleration: Floats, gravity: float = GRAVITY) -> Floats:
         """See the base class."""
-        result = np.asarray(self.rotor * acceleration - (self.balance if gravity else 0.0), dtype=np.float64)
+        drives = self.drives
+        result = np.asarray(drives.rotor * acceleration - (drives.balance if gravity else 0.0), dtype=np.float64)
+        bed = MovingFrame.bed(len(q), gravity * self.down)
         for side in self.sides:
-            for axis, force in zip(side, side_forces(side, q, rate, acceleration, gravity * self.down), strict=True):
+            for axis, force in zip(side, side_forces(side, q, rate, acceleration, bed)[0], strict=True):
                 result[:, axis.at] += force
         return result
 
 
-def side_forces(side: Sequence[AxisBody], q: Floats, rate: Floats, acceleration: Floats, gravity: Floats) -> list[Floats]:
-    """(N,) of each axis of a side, from the bed outwards."""
+def side_forces(side: Sequence[AxisBody], q: Floats, rate: Floats, acceleration: Floats,
+                bed: MovingFrame) -> tuple[list[Floats], Floats, Floats]:
+    """(N,) of each axis of a side, from the bed outwards; moment about the machine's origin and force (N, 3) on the bed."""
     n = len(q)
-    turn, shift = np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
-    omega, v, alpha, a = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros((n, 3)), np.tile(-gravity, (n, 1))
+    turn, shift, omega, v, alpha, a = bed.turn, bed.shift, bed.omega, bed.v, bed.alpha, bed.a
     screws, loads = [], []
     for axis in side:
         at, step = q[:, axis.at] * axis.sense, (rate[:, axis.at, None], acceleration[:, axis.at, None])
@@ -75,13 +95,13 @@ def side_forces(side: Sequence[AxisBody], q: Floats, rate: Floats, acceleration:
         omega, v = omega + s * step[0], v + t * step[0]
         turn, shift = _moved(axis.joint, at, turn, shift)
         screws.append((s, t))
-        loads.append(_load(axis.body, turn, shift, (omega, v, alpha, a)))
+        loads.append(loads_of(axis.bodies, MovingFrame(turn, shift, omega, v, alpha, a)))
     moment, force = np.zeros((n, 3)), np.zeros((n, 3))
     found = []
     for (s, t), load in zip(reversed(screws), reversed(loads), strict=True):
         moment, force = moment + load[0], force + load[1]
         found.append(dot(s, moment) + dot(t, force))
-    return found[::-1]
+    return found[::-1], moment, force
 
 
 def _moved(joint: Joint, at: Floats, turn: Floats, shift: Floats) -> tuple[Floats, Floats]:
@@ -92,13 +112,15 @@ def _moved(joint: Joint, at: Floats, turn: Floats, shift: Floats) -> tuple[Float
     return np.asarray(turn @ own), shift + np.einsum("nij,nj->ni", turn, joint.point - own @ joint.point)
 
 
-def _load(body: RigidBody, turn: Floats, shift: Floats,
-          moving: tuple[Floats, Floats, Floats, Floats]) -> tuple[Floats, Floats]:
-    """(moment about the origin, force), each (N, 3), that a body takes."""
-    omega, v, alpha, a = moving
-    centre = turn @ body.centre + shift
-    force = body.mass * (a + cross(alpha, centre) + cross(omega, v + cross(omega, centre)))
-    return cross(centre, force) + spun(body.inertia, turn, omega, alpha), force
+def loads_of(bodies: Sequence[RigidBody], frame: MovingFrame) -> tuple[Floats, Floats]:
+    """(moment about the origin, force), each (N, 3), that bodies take that move with a frame."""
+    moment, force = np.zeros_like(frame.v), np.zeros_like(frame.v)
+    for body in bodies:
+        centre = frame.turn @ body.centre + frame.shift
+        spin = cross(frame.omega, frame.v + cross(frame.omega, centre))
+        f = body.mass * (frame.a + cross(frame.alpha, centre) + spin)
+        force, moment = force + f, moment + cross(centre, f) + spun(body.inertia, frame.turn, frame.omega, frame.alpha)
+    return moment, force
 
 
 def spun(inertia: Floats, turn: Floats, omega: Floats, alpha: Floats) -> Floats:

@@ -13,10 +13,10 @@ from dataclasses import field
 
 import numpy as np
 
-from machines.dynamics.bodies import GRAVITY, Dynamics, RigidBody
-from machines.dynamics.chain import AxisBody, side_forces, spun
+from machines.dynamics.bodies import GRAVITY, Drives, Dynamics, RigidBody
+from machines.dynamics.chain import AxisBody, MovingFrame, loads_of, side_forces
 from machines.kinematics.base import Kinematics
-from machines.kinematics.leg_motion import FifthAxis, LegMotion, LegParts
+from machines.kinematics.leg_motion import LegMotion, LegParts
 from toolpaths.arrays import Bools, Floats
 from toolpaths.dataclass import dataclass
 from toolpaths.rotations import cross, dot, rotation
@@ -55,32 +55,38 @@ class LegMasses:
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(rotor="J", balance="J", down="3")
+@arrays(down="3")
 class LegDynamics(Dynamics):
-    """A platform on legs, with carriers or with a rotary axis; `rotor` and `balance` as of chains."""
+    """A platform on legs, with carriers or with rotary axes; `drives` and `down` as of chains.
+
+    Attributes:
+        platform: bodies that move with the platform
+        table: axes under the part, from the bed to it
+        head: axes from the platform to the spindle
+    """
 
     kinematics: Kinematics
     parts: LegParts
     masses: LegMasses
-    platform: RigidBody
-    rotor: Floats
-    balance: Floats
+    platform: tuple[RigidBody, ...]
+    drives: Drives
     down: Floats
-    head: RigidBody | None = None
     table: tuple[AxisBody, ...] = field(default=())
+    head: tuple[AxisBody, ...] = field(default=())
 
     def forces(self, q: Floats, rate: Floats, acceleration: Floats, gravity: float = GRAVITY) -> Floats:
         """See the base class."""
         load = self.loads(q, rate, acceleration, gravity)
-        result = np.asarray(self.rotor * acceleration - (self.balance if gravity else 0.0), dtype=np.float64)
+        drives = self.drives
+        result = np.asarray(drives.rotor * acceleration - (drives.balance if gravity else 0.0), dtype=np.float64)
         result[:, self.parts.legs_at] += load.drives + np.einsum("nik,ni->nk", load.motion.rates, load.wrench)
         if len(self.parts.carriers_at):
             own = self._carriers(acceleration, gravity, load.total)
             result[:, self.parts.carriers_at] += own
-        if self.parts.axis is not None:
-            beyond = load.head if self.parts.axis.at_spindle else \
-                side_forces(self.table, q, rate, acceleration, gravity * self.down)[0]
-            result[:, -1] += beyond
+        bed = MovingFrame.bed(len(q), gravity * self.down)
+        table = side_forces(self.table, q, rate, acceleration, bed)[0] if self.table else []
+        for axis, force in zip((*self.table, *self.head), (*table, *load.head), strict=True):
+            result[:, axis.at] += force
         return result
 
     def loads(self, q: Floats, rate: Floats, acceleration: Floats, gravity: float = GRAVITY) -> PlatformLoads:
@@ -90,19 +96,15 @@ class LegDynamics(Dynamics):
         legs = ~self.masses.under_part
         base = base + acceleration[:, self.parts.carriers_at[legs]] @ self.parts.carriers[legs]
         at_feet, at_ends = self._rods(motion, base[:, None])
-        force = at_ends.sum(axis=1)
-        moment = cross(motion.arms, at_ends).sum(axis=1)
-        own, turn = self.platform, motion.turn
-        centre, omega, alpha = turn @ own.centre, motion.twist[:, 3:], motion.acceleration[:, 3:]
-        f = own.mass * (base + motion.acceleration[:, :3] + cross(alpha, centre) + cross(omega, cross(omega, centre)))
-        force, moment = force + f, moment + cross(centre, f) + spun(own.inertia, turn, omega, alpha)
-        head, axis = np.zeros(len(q)), self.parts.axis
-        if self.head is not None and axis is not None:
-            head, f, m = _head(self.head, axis, motion, (q[:, -1], rate[:, -1], acceleration[:, -1]), base)
-            force, moment = force + f, moment + m
+        about_c = MovingFrame(motion.turn, np.zeros_like(base), motion.twist[:, 3:], np.zeros_like(base),
+                              motion.acceleration[:, 3:], base + motion.acceleration[:, :3])
+        m, f = loads_of(self.platform, about_c)
+        head, beyond_m, beyond_f = side_forces(self.head, q, rate, acceleration, about_c)
+        force = at_ends.sum(axis=1) + f + beyond_f
+        moment = cross(motion.arms, at_ends).sum(axis=1) + m + beyond_m
         at_drives, drives = self._drives(motion, (q, rate, acceleration), base[:, None])
         return PlatformLoads(motion, dot(motion.moved, at_feet) + drives, np.concatenate([force, moment], axis=1),
-                             force + at_feet.sum(axis=1) + at_drives, head)
+                             force + at_feet.sum(axis=1) + at_drives, tuple(head))
 
     def _rods(self, motion: LegMotion, base: Floats) -> tuple[Floats, Floats]:
         """Forces of rods and joints on A and on B of each leg (N, K, 3)."""
@@ -157,7 +159,7 @@ class LegDynamics(Dynamics):
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(drives="N K", wrench="N 6", total="N 3", head="N")
+@arrays(drives="N K", wrench="N 6", total="N 3")
 class PlatformLoads:
     """What a motion asks for.
 
@@ -166,14 +168,14 @@ class PlatformLoads:
         drives: (N, K) of the drives' own bodies and of the feet of the rods
         wrench: (N, 6) force and moment about C on the platform, ends of the rods included
         total: (N, 3) force on what carries it all
-        head: (N,) torque of the axis between platform and spindle
+        head: (N,) torque of each axis between platform and spindle
     """
 
     motion: LegMotion
     drives: Floats
     wrench: Floats
     total: Floats
-    head: Floats
+    head: tuple[Floats, ...]
 
 
 def _along(motion: LegMotion, mass: Floats, origin: Floats, offset: Floats, from_end: bool) -> tuple[Floats, Floats]:
@@ -187,18 +189,3 @@ def _along(motion: LegMotion, mass: Floats, origin: Floats, offset: Floats, from
     aside = (offset[:, None] / span) * (f - e * dot(f, e)[:, :, None])
     return (-aside, f + aside) if from_end else (f - aside, aside)
 
-
-def _head(body: RigidBody, axis: FifthAxis, motion: LegMotion, moving: tuple[Floats, Floats, Floats],
-          base: Floats) -> tuple[Floats, Floats, Floats]:
-    """(torque (N,), force (N, 3), moment about C (N, 3)) of what turns on an axis that the platform carries."""
-    q, rate, acceleration = moving
-    turn, omega, alpha = motion.turn, motion.twist[:, 3:], motion.acceleration[:, 3:]
-    u, pivot = turn @ axis.direction, turn @ axis.point
-    own = turn @ rotation(axis.direction, q)
-    arm = own @ (body.centre - axis.point)
-    start = base + motion.acceleration[:, :3] + cross(alpha, pivot) + cross(omega, cross(omega, pivot))
-    alpha = alpha + cross(omega, u) * rate[:, None] + u * acceleration[:, None]
-    omega = omega + u * rate[:, None]
-    f = body.mass * (start + cross(alpha, arm) + cross(omega, cross(omega, arm)))
-    own_moment = cross(arm, f) + spun(body.inertia, own, omega, alpha)
-    return dot(u, own_moment), f, own_moment + cross(pivot, f)

@@ -1,9 +1,14 @@
 """What the forces of the motors allow along a path: the pose-dependent limits of its second order.
 
-Along a path q(s) the motors give F = a s'' + b s'^2 + c with a = M q_s, b = M q_ss + h(q, q_s) and c = g(q), for F is linear
-in the accelerations and square in the rates. What gravity and a force at the tool take is taken off the limit on both
-sides, so that |a s'' + b s'^2| <= F_max - |c| - |J^T f|: slowing a motion down then never asks for more. (The side on which
-gravity would help is given away; counterbalances are in c.)
+Along a path q(s) the motors give F = a s'' + b s'^2 + k s' + c with a = M q_s, b = M q_ss + h(q, q_s), k the viscous
+friction of the drives times q_s and c = g(q) less counterbalances, and their dry friction in the sense of q_s: F is linear
+in the accelerations and square in the rates.
+Both sides count by themselves, -F_max <= F <= F_max: where gravity or friction helps,
+there is more to brake or to accelerate with. A force at the tool in its worst direction, |J^T f|, is taken off both.
+
+k s' is not linear in x = s'^2: s' <= v/2 + x/(2 v), equal at the largest speed v that a place allows, stands in its place
+where friction takes force, and x/(2 v), less than s' up to 2 v, where it gives some. So the rows hold more than is needed,
+never less.
 """
 
 from __future__ import annotations
@@ -43,34 +48,74 @@ class ForceLimits:
     acceleration: Floats
     cutting: float = 0.0
 
-    def rows(self, q: Floats, dq: Floats, d2q: Floats) -> tuple[Floats, Floats]:
-        """(a, b), each (N, J), over what is left of the limits: |a x'/2 + b x| <= 1, x = s'^2; 0 of motors without a limit.
+    def rows(self, q: Floats, dq: Floats, d2q: Floats, speed: Floats) -> tuple[Floats, Floats, Floats]:
+        """(a, b, o), each (N, J): |a x'/2 + b x + o| <= 1, x = s'^2, |o| < 1; 0 of motors without a limit.
 
         Args:
             q, dq, d2q: (N, J) joints and their derivatives along the path
+            speed: (N,) largest s'; may be infinite
         """
-        left = self.left(q)
-        own = self.dynamics.forces
         zero = np.zeros_like(dq)
+        first, second = (self.dynamics.forces(q, *motion, 0.0) for motion in ((zero, dq), (dq, d2q)))
+        low, high = self.room(q, np.sign(dq))
+        per_speed = self.dynamics.drives.viscous * dq
+        if per_speed.any():
+            steady = self._steady(second, per_speed, low, high).min(axis=1)
+            fastest = np.where(np.isfinite(speed), np.minimum(speed, np.maximum(steady, 0.5 * speed)), steady)
+            fastest = np.where(np.isfinite(fastest) & (fastest > 0.0), fastest, 1.0)[:, None]
+            second = second + per_speed / (2.0 * fastest)
+            high, low = (np.maximum(side - np.maximum(sense * per_speed, 0.0) * 0.5 * fastest, LEAST * self.limits)
+                         for side, sense in ((high, 1.0), (low, -1.0)))
+        half = 0.5 * (high + low)
         with np.errstate(invalid="ignore"):
-            first, second = (own(q, rate, acceleration, 0.0) / left for rate, acceleration in ((zero, dq), (dq, d2q)))
-        return np.nan_to_num(first), np.nan_to_num(second)
+            first, second, middle = (np.nan_to_num(part / half) for part in (first, second, 0.5 * (low - high)))
+        return first, second, middle
+
+    def room(self, q: Floats, way: Floats) -> tuple[Floats, Floats]:
+        """(N, J) how far what a motion takes may fall and rise at joints q; `way` (N, J) signs of their rates."""
+        zero = np.zeros_like(q)
+        need = self.dynamics.forces(q, zero, zero) + self.dynamics.drives.friction * way
+        most = self.limits - self._cut(q)
+        return np.maximum(most + need, LEAST * self.limits), np.maximum(most - need, LEAST * self.limits)
+
+    def steady(self, q: Floats, dq: Floats, d2q: Floats) -> Floats:
+        """(N, J) largest constant s' of each motor; infinite without a limit."""
+        taken = self.dynamics.forces(q, dq, d2q, 0.0), self.dynamics.drives.viscous * dq
+        return self._steady(*taken, *self.room(q, np.sign(dq)))
+
+    def _steady(self, second: Floats, per_speed: Floats, low: Floats, high: Floats) -> Floats:
+        return np.minimum(_reach(second, per_speed, high), _reach(-second, -per_speed, low))
 
     def use(self, q: Floats, rate: Floats, acceleration: Floats) -> Floats:
-        """(N, J) what a motion takes of what is left of each limit; 1: all. 0 of motors without a limit."""
+        """(N, J) by how much a motion is to be slowed, as the square of a factor on time, until its motors keep their
+        limits: 1 where one is just kept, below it the share of what gravity and friction leave. 0 without a limit."""
+        first, per_speed = self.dynamics.forces(q, rate, acceleration, 0.0), self.dynamics.drives.viscous * rate
+        low, high = self.room(q, np.sign(np.where(rate == 0.0, acceleration, rate)))
+        taken = first + per_speed
+        sense = np.where(taken < 0.0, -1.0, 1.0)
+        side = np.where(taken < 0.0, low, high)
         with np.errstate(invalid="ignore"):
-            return np.nan_to_num(np.abs(self.dynamics.forces(q, rate, acceleration, 0.0)) / self.left(q))
+            share = np.nan_to_num(np.abs(taken) / side)
+        slower = _reach(sense * first, sense * per_speed, side)
+        return np.where(share > 1.0, slower**-2.0, share)
+
+    def _cut(self, q: Floats) -> Floats | float:
+        """(N, J) what the force at the tip takes in its worst direction."""
+        if not self.cutting:
+            return 0.0
+        return np.asarray(self.cutting * np.linalg.norm(self.kinematics.jacobian(q)[:, :3], axis=1))
 
     def loads(self, q: Floats, rate: Floats, acceleration: Floats) -> tuple[Floats, Floats]:
         """Shares (N, J) of the limits in steady motion at joints q with rates (N, J), and with accelerations up to
         `acceleration` (J,) of all joints in the signs that are worst for each motor; 0 of motors without a limit."""
-        zero = np.zeros_like(q)
-        steady = np.abs(self.dynamics.forces(q, rate, zero))
-        if self.cutting:
-            steady = steady + self.cutting * np.linalg.norm(self.kinematics.jacobian(q)[:, :3], axis=1)
+        zero, drives = np.zeros_like(q), self.dynamics.drives
+        moving = self.dynamics.forces(q, rate, zero)
+        cut = self._cut(q)
+        steady = np.abs(moving + drives.resisting(rate, zero)) + cut
         most = np.where(np.isfinite(acceleration), acceleration, 0.0)
         each = (self.dynamics.forces(q, zero, np.broadcast_to(row, q.shape), 0.0) for row in np.diag(most))
-        ramp = steady + np.sum([np.abs(one) for one in each], axis=0)
+        taken = np.abs(moving) + drives.friction + drives.viscous * np.abs(rate) + cut
+        ramp = taken + np.sum([np.abs(one) for one in each], axis=0)
         return np.nan_to_num(steady / self.limits), np.nan_to_num(ramp / self.limits)
 
     def names(self, machine: Machine) -> tuple[str, ...]:
@@ -78,17 +123,22 @@ class ForceLimits:
         return machine.axis_names
 
     def standing(self, q: Floats) -> Floats:
-        """(N, J) of the limits: what gravity and the force at the tool take of each, standing still."""
+        """(N, J) of the limits: what gravity, dry friction and the force at the tip take of each, hardly moving, at most."""
         zero = np.zeros_like(q)
-        still = np.abs(self.dynamics.forces(q, zero, zero))
-        if self.cutting:
-            rates = self.kinematics.jacobian(q)[:, :3]
-            still = still + self.cutting * np.linalg.norm(rates, axis=1)
+        still = np.abs(self.dynamics.forces(q, zero, zero)) + self.dynamics.drives.friction + self._cut(q)
         return np.asarray(still / self.limits, dtype=np.float64)
 
     def left(self, q: Floats) -> Floats:
-        """(N, J) what is left of the limits for motion."""
+        """(N, J) what is left of the limits for motion on both sides."""
         return np.asarray(self.limits * np.maximum(1.0 - self.standing(q), LEAST), dtype=np.float64)
+
+
+def _reach(square: Floats, linear: Floats, most: Floats) -> Floats:
+    """The least v > 0 with square v^2 + linear v = most > 0; infinite where there is none."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inside = linear**2 + 4.0 * square * most
+        below = linear + np.sqrt(np.where(inside >= 0.0, inside, np.nan))
+        return np.where(below > 0.0, 2.0 * most / below, np.inf)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,9 +156,13 @@ class DriveLimits:
     axes: Kinematics
     acceleration: Floats
 
-    def rows(self, q: Floats, dq: Floats, d2q: Floats) -> tuple[Floats, Floats]:
+    def rows(self, q: Floats, dq: Floats, d2q: Floats, speed: Floats) -> tuple[Floats, Floats, Floats]:
         """See `ForceLimits`: joints are axes, rows are drives."""
-        return self.own.rows(*drive_motion(self.axes, q, dq, d2q))
+        return self.own.rows(*drive_motion(self.axes, q, dq, d2q), speed)
+
+    def steady(self, q: Floats, dq: Floats, d2q: Floats) -> Floats:
+        """See `ForceLimits`."""
+        return self.own.steady(*drive_motion(self.axes, q, dq, d2q))
 
     def use(self, q: Floats, rate: Floats, acceleration: Floats) -> Floats:
         """See `ForceLimits`."""

@@ -36,7 +36,8 @@ class MotionAsked:
 
 
 def forces_at(machine: Machine, asked: MotionAsked) -> dict[str, Any]:
-    """What each motor gives at a place, by parts: inertia, rates alone, gravity (counterbalances off it), force at the tip.
+    """What each motor gives at a place, by parts: inertia, rates alone, gravity (counterbalances off it), friction (of an
+    axis that is only about to move: against its acceleration), force at the tip.
 
     Raises:
         DiagnosticError: no masses, or the machine does not reach the place.
@@ -52,7 +53,7 @@ def forces_at(machine: Machine, asked: MotionAsked) -> dict[str, Any]:
     units, still = force_units(machine), np.zeros_like(q)
     rates_alone = dynamics.forces(q, rate, acceleration, 0.0) - dynamics.forces(q, still, acceleration, 0.0)
     parts = {"inertia": dynamics.forces(q, still, acceleration, 0.0), "speed_squared": rates_alone,
-             "gravity": dynamics.forces(q, still, still),
+             "gravity": dynamics.forces(q, still, still), "friction": dynamics.drives.resisting(rate, acceleration),
              "force_at_the_tip": -NEWTON * asked.force @ kinematics.jacobian(q)[:, :3]}
     parts["together"] = np.asarray(sum(parts.values()))
     limits = force_limits_of(machine) / units
@@ -164,8 +165,8 @@ def positions(machine: Machine) -> Floats:
     home = machine.home[None]
     if (over := kinematics.over_workspace) is not None:
         place, tilt = over.workspace.grid(GRID)
-        turn = np.tile(machine.home[-1:], (len(place), 1)) if kinematics.leg_parts and kinematics.leg_parts.axis else \
-            np.zeros((len(place), 0))
+        turning = () if kinematics.leg_parts is None else kinematics.leg_parts.axes
+        turn = np.tile(machine.home[sorted(axis.at for axis in turning)], (len(place), 1))
         q = over.joints_at(np.column_stack([place, tilt]), turn)
         return np.concatenate([home, q[np.isfinite(q).all(axis=1)]])
     low = np.where(np.isfinite(machine.limits.lower), machine.limits.lower, -np.pi)

@@ -50,7 +50,9 @@ def rod_figures(machine: Machine, dynamics: LegDynamics) -> dict[str, Any]:
     t = np.swapaxes(rows.rods[:, :, rows.columns], 1, 2)
     back = np.zeros((len(t), rows.rods.shape[1], 6))
     back[:, :, rows.columns] = np.linalg.pinv(t)
-    centre = poses.turn @ dynamics.platform.centre
+    bodies = dynamics.platform
+    mass = sum(one.mass for one in bodies)
+    centre = poses.turn @ (sum((one.mass * one.centre for one in bodies), np.zeros(3)) / (mass or 1.0))
     zero = np.zeros(len(centre))
     x, y, z = centre.T
     lever = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=1).reshape(-1, 3, 3)

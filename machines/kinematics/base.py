@@ -128,8 +128,8 @@ class Kinematics(ABC):
 
     @property
     def open_parameters(self) -> tuple[str, ...]:
-        """What a tip and an axis leave open besides branches and the family of `singular`: SPIN, or letters of joints that
-        may stand anywhere; () where the joints follow from the pose."""
+        """What a pose leaves open besides branches and the family of `singular`: SPIN, or letters of joints that may stand
+        anywhere; () where the joints follow."""
         return ()
 
     @property
@@ -168,8 +168,7 @@ class Kinematics(ABC):
     def with_tool(self, length: float) -> Self:
         """The same kinematics at the tip of a tool of that length (mm): tip = gauge point - length * axis.
 
-        The last few are kept, with what they have worked out.
-        """
+        The last few are kept, with what they have worked out."""
         kept = self._with_tools
         if length not in kept:
             if len(kept) >= KEPT:
@@ -190,13 +189,12 @@ class Kinematics(ABC):
         return made
 
     def nearest_axis(self, axis: Floats) -> Floats:
-        """The tool directions (N, 3) that the machine can take nearest to `axis` (N, 3); the same where reachable, and where
-        the kind does not know: `inverse` then says what it cannot take."""
+        """The tool directions (N, 3) in reach nearest to `axis` (N, 3); the same where the kind does not know: `inverse`
+        then says what it cannot take."""
         return as_points(axis, 3, "axis")
 
     def singular(self, q: Floats) -> Bools:
-        """True (N,) where joints may turn while the tool stands, so that the inverse is a family: mostly
-        where the tool lies along a rotary axis."""
+        """True (N,) where joints may turn while the tool stands, mostly with it along a rotary axis (families)."""
         return by_samples.free(self.jacobian(q), self.rotary)
 
     def assembly_modes(self, q: Floats) -> tuple[Floats, Floats]:
@@ -206,16 +204,14 @@ class Kinematics(ABC):
         return tip[None], axis[None]
 
     def with_all_roots(self) -> Self:
-        """The same machine with every choice of roots of its legs among the branches of `inverse`, its own first: also those
-        to which it is not assembled. Without legs as it is."""
+        """The same machine with every choice of roots of its legs among the branches of `inverse`, its own first, also those
+        to which it is not assembled."""
         return self
 
     def carried(self, pose: Floats, q0: Floats, q1: Floats) -> Floats:
-        """The pose (N, 6) at joints q0 (N, J) as the rotary joints outside the closed loops turn it on the
-        path to q1 (N, J).
+        """The pose (N, 6) at joints q0 (N, J) as the joints outside the closed loops take it on the path to q1 (N, J).
 
-        On parallel machines it is what `forward` at q1 takes as `near`: what is left between the two is the slides' part.
-        """
+        On parallel machines it is what `forward` at q1 takes as `near`: what is left is the part of the legs."""
         return pose
 
     def at_tip(self, tip: Floats, q: Floats, solved: Ints) -> Floats:
@@ -243,8 +239,13 @@ class Kinematics(ABC):
         return tuple(not rotary for rotary in self.rotary)
 
     @property
+    def in_loops(self) -> tuple[bool, ...]:
+        """(J,) True for joints that may bring a platform from one assembly mode to another; `carried` follows others."""
+        return tuple(not rotary or drives for rotary, drives in zip(self.rotary, self.drives_tip, strict=True))
+
+    @property
     def slides_turn_tool(self) -> bool:
-        """True where a linear joint may turn the tool (`turns_tool`): standing rotary joints then do not hold its axis."""
+        """True where a linear joint may turn the tool: standing rotary joints then do not hold its axis."""
         return any(turns and not rotary for turns, rotary in zip(self.turns_tool, self.rotary, strict=True))
 
     def jacobian(self, q: Floats, near: Floats | None = None) -> Floats:
@@ -265,8 +266,8 @@ class Kinematics(ABC):
     def jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
         """(tip in mm, tool axis) in the table frame along the straight moves q0 -> q1 (N, J).
 
-        Machines of several assembly modes are taken in their home mode. Where `jets_proved` the third
-        derivative is a bound over the whole move (`rod_loops.UNBOUNDED` where none was found), else what was seen of it.
+        Machines of several assembly modes: home mode. Where `jets_proved` the third derivative is a bound over the whole
+        move (`rod_loops.UNBOUNDED` where none was found), else what was seen of it.
         """
         return by_samples.jets(self.forward, q0, q1)
 
@@ -293,8 +294,7 @@ class Kinematics(ABC):
     # ---- singular positions, clearances --------------------------------------------------------------------
 
     def singular_distance(self, q: Floats) -> Floats:
-        """(N, S) how far joints q (N, J) stand from the singular positions of `singular_names`, between 0 and
-        1, home mode; NaN without a pose."""
+        """(N, S) how far joints q (N, J) stand from `singular_names`, between 0 and 1, home mode; NaN without a pose."""
         return np.zeros((len(q), 0))
 
     def singular_distance_between(self, q: Floats) -> Floats:

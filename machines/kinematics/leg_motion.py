@@ -11,17 +11,19 @@ from toolpaths.shapes import arrays
 
 @dataclass(frozen=True, eq=False)
 @arrays(direction="3", point="3")
-class FifthAxis:
-    """A rotary axis next to a platform: its line, in the level platform, or in the machine frame of a table."""
+class RotaryNext:
+    """A rotary axis next to a platform: its joint, its line, in the level platform, or in the machine frame of a table."""
 
     name: str
+    at: int
     direction: Floats
     point: Floats
     at_spindle: bool
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(legs_at="K", points="K 3", directions="K 3", lengths="K", arm="K", stretches="K", carriers_at="M", carriers="M 3")
+@arrays(legs_at="K", points="K 3", directions="K 3", lengths="K", arm="K", stretches="K", carriers_at="M", carriers="M 3",
+        gauge="3")
 class LegParts:
     """What moves of a machine on K legs, mm.
 
@@ -33,7 +35,8 @@ class LegParts:
         arm, stretches: (K,) legs on an arm, legs of changing length; the others are on slides
         carriers_at: (M,) joints of the slides that carry legs and platform, or the part
         carriers: (M, 3) unit vectors, how each moves the tool seen from the part
-        axis: the rotary axis next to the platform, the last joint
+        gauge: (3,) mm from the reference point of the level platform to the gauge point, all axes at 0
+        axes: the rotary axes next to the platform, from the bed to the part, then from the platform to the spindle
     """
 
     legs_at: Ints
@@ -44,7 +47,8 @@ class LegParts:
     stretches: Bools
     carriers_at: Ints
     carriers: Floats
-    axis: FifthAxis | None = None
+    gauge: Floats
+    axes: tuple[RotaryNext, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -138,9 +138,10 @@ class Serial(Kinematics):
     def _tip_at_zero(self) -> list[Floats | float]:
         return columns.of_one(-self.tool_length * self.tool_axis)
 
-    def _turning(self, q: Floats) -> Turning:
-        """Cosine and sine (N,) of each rotary joint of q (N, J)."""
-        return {name: (np.cos(q[:, j]), np.sin(q[:, j])) for name, j in self._turning_columns}
+    def _turning(self, q: Floats, some: frozenset[str] | None = None) -> Turning:
+        """Cosine and sine (N,) of each rotary joint of q (N, J), or of `some` of them."""
+        return {name: (np.cos(q[:, j]), np.sin(q[:, j])) for name, j in self._turning_columns
+                if some is None or name in some}
 
     @cached_property
     def _loop(self) -> ChainLoop:
@@ -394,7 +395,9 @@ class Serial(Kinematics):
         q = as_points(q, self.joints, "q")
         if not (turns := self._turns):
             return np.zeros(len(q), dtype=np.bool_)
-        _, carried = self._sweep(turns[1:], None, self._turning(q), [columns.of_one(np.zeros(3)),
-                                                                     columns.of_one(self.tool_axis)])
-        found = columns.along(turns[0].along, carried, ROUND_OFF)
-        return np.broadcast_to(found, (len(q),)).copy()
+        inner, found = frozenset(turn.name for turn in turns[1:]), np.empty(len(q), dtype=np.bool_)
+        starts = [columns.of_one(np.zeros(3)), columns.of_one(self.tool_axis)]
+        for part in columns.blocks(len(q)):
+            _, carried = self._sweep(turns[1:], None, self._turning(q[part], inner), starts)
+            found[part] = columns.along(turns[0].along, carried, ROUND_OFF)
+        return found

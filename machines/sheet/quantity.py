@@ -22,6 +22,12 @@ UNITS: dict[QuantityKind, dict[str, float]] = {
 _NUMBER = re.compile(r"\s*([-+]?\d+(?:\.\d+)?|[-+]?\.\d+)\s*(.*?)\s*$")
 
 
+_ALSO = re.compile(r"\s*\([^()]*\)\s*$")
+"""the same figure in other units, as brochures print it behind the first: "762 mm (30 in)\""""
+_ANGLES = re.compile(r"([-+]?\d+(?:\.\d+)?|[-+]?\.\d+)(?:\s*(?:degrees|deg|°))?")
+_BETWEEN = re.compile(r"\s*(?:\bto\b|\.\.+|…|/|,|;)\s*|\s+")
+
+
 class WrongFigureError(ValueError):
     """Why a figure of a sheet cannot be taken, and what to write instead."""
 
@@ -38,7 +44,7 @@ def read_quantity(text: str, measure: QuantityKind) -> float:
     """
     units = UNITS[measure]
     known = ", ".join(units)
-    found = _NUMBER.match(text)
+    found = _NUMBER.match(_ALSO.sub("", text))
     if found is None:
         example = f"12.5 {next(iter(units))}"
         raise WrongFigureError(f"{text!r} is not a number with a unit", f"write {_a(measure)} as in {example!r}")
@@ -48,6 +54,22 @@ def read_quantity(text: str, measure: QuantityKind) -> float:
     if unit not in units:
         raise WrongFigureError(f"{unit!r} is no unit of {_a(measure)}", f"known are {known}")
     return float(number) * units[unit]
+
+
+def angles_of(text: str) -> tuple[float, float] | None:
+    """Both ends of the travel of a rotary axis, degrees, the lower one first, as brochures print them: "-35 to 120 deg",
+    "+120/-35", "±110°"; None for anything else."""
+    plain = text.strip()
+    if plain.startswith(("±", "+/-")):
+        one = _ANGLES.fullmatch(plain.removeprefix("±").removeprefix("+/-").strip())
+        return None if one is None else (-abs(float(one[1])), abs(float(one[1])))
+    first = _ANGLES.match(plain)
+    gap = _BETWEEN.match(plain, first.end()) if first else None
+    last = _ANGLES.fullmatch(plain, gap.end()) if gap else None
+    if first is None or last is None:
+        return None
+    low, high = sorted((float(first[1]), float(last[1])))
+    return low, high
 
 
 def _a(measure: QuantityKind) -> str:

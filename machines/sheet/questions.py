@@ -11,7 +11,7 @@ from machines.sheet.jog import QUESTIONS
 from machines.sheet.make import ALSO_ENDLESS, ENDLESS
 from machines.sheet.model import PivotForm, ZeroEnd, spelt
 from machines.sheet.pivots import names_of
-from machines.sheet.quantity import QuantityKind, read_quantity
+from machines.sheet.quantity import QuantityKind, angles_of, read_quantity
 from toolpaths.dataclass import dataclass
 
 Check = Callable[[str], str]
@@ -50,6 +50,8 @@ class SheetQuestion:
         return self.check(text)
 
 
+_WHERE = {"MRZP": " (settings 255 to 257, as the control shows them)", "MRZP second": " (where the control has two sets)"}
+"""where the numbers of a pivot stand, by its name"""
 Ask = Callable[[SheetQuestion], str]
 
 
@@ -124,14 +126,12 @@ def _slide(sheet: _Sheet, letter: str) -> Iterator[str]:
 
 def _turn(sheet: _Sheet, letter: str, in_table: bool) -> Iterator[str]:
     def ends(text: str) -> str:
-        if text.lower() in (ENDLESS, *ALSO_ENDLESS):
+        if any(word in text.lower() for word in (ENDLESS, *ALSO_ENDLESS)):
             return json.dumps(ENDLESS)
-        both = text.replace(" to ", " ").replace(",", " ").split()
-        if len(both) != 2:
+        both = angles_of(text)
+        if both is None:
             raise ValueError(f"{text!r} is not two angles as -35 120, nor {ENDLESS}")
-        for one in both:
-            read_quantity(f"{one} deg", "angle")
-        return json.dumps([f"{one} deg" for one in both])
+        return json.dumps([f"{one:g} deg" for one in both])
 
     def seen(text: str) -> str:
         if text:
@@ -178,7 +178,8 @@ def _pivots(sheet: _Sheet, table: tuple[str, ...], head: tuple[str, ...]) -> Ite
         for name in chain:
             needed = "(" not in name and name != "MRZP second"
             plain = name.strip("()")
-            words, default = (f"{plain}: X Y Z in mm", None) if needed else (f"{plain}: X Y Z in mm; empty: none", "")
+            asked = f"{plain}{_WHERE.get(plain, '')}: X Y Z in mm"
+            words, default = (asked, None) if needed else (f"{asked}; empty: none", "")
             numbers = sheet.text(words, default, vector)
             yield from [f"{json.dumps(plain)} = {numbers}"] if numbers else []
 

@@ -8,19 +8,36 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Protocol, Self, TypeVar
 
 import numpy as np
 
 from machines.certificate.poses import PosesOfBoxes
 from machines.certificate.spans import spanned
 from machines.kinematics.leg_geometry import LegGeometry
-from machines.tolerances.sensitivity import DimensionPart, LegDimension, RodsOfLegs, adjusted, sensitivity
+from machines.tolerances.sensitivity import LegDimension, RodsOfLegs, adjusted, sensitivity
 from toolpaths.arrays import Floats
 from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 LEVELS, TILTS, HEADINGS, AT_ONCE = 5, 4, 8, 1_000
 """places per direction, tilts, directions of tilt; poses at a time"""
+
+
+class Poses(Protocol):
+    """Where a machine stands, N times."""
+
+    @property
+    def pose(self) -> Floats:
+        """(N, 5): x, y, z, tilt, heading."""
+        ...
+
+    def part(self, rows: slice) -> Self:
+        """Some of them."""
+        ...
+
+
+P = TypeVar("P", bound=Poses)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,11 +102,11 @@ class LargestInfluence:
     turn_at: Floats
 
 
-def largest(of: Influence, poses: PlatformPoses, groups: tuple[tuple[int, ...], ...]) -> LargestInfluence:
+def largest(of: Callable[[P], Floats], poses: P, groups: tuple[tuple[int, ...], ...]) -> LargestInfluence:
     """Over poses, of groups of dimensions whose errors may point anywhere in a sphere: one dimension, or a point's three."""
     found = LargestInfluence(*(np.zeros(len(groups)) for _ in range(2)), *(np.zeros((len(groups), 5)) for _ in range(2)))
     best, where = [found.position.copy(), found.turn.copy()], [found.position_at.copy(), found.turn_at.copy()]
-    for first in range(0, len(poses.place), AT_ONCE):
+    for first in range(0, len(poses.pose), AT_ONCE):
         some = poses.part(slice(first, first + AT_ONCE))
         s = of(some)
         for half, rows in enumerate((slice(0, 3), slice(3, 6))):
@@ -111,7 +128,7 @@ def by_point(dimensions: tuple[LegDimension, ...]) -> dict[LegDimension, tuple[i
     """The dimensions of each point, guide and rod, by what they are of, without a direction."""
     groups: dict[LegDimension, tuple[int, ...]] = {}
     for k, one in enumerate(dimensions):
-        whole = replace(one, axis="")
+        whole = replace(one, axis="turn" if one.angular and one.part != "guide" else "")
         groups[whole] = (*groups.get(whole, ()), k)
     return groups
 
@@ -140,14 +157,21 @@ def _parts(sizes: Floats) -> tuple[float, float, float, float]:
     return float(sizes.mean()), half, most, nearly_all
 
 
-def budget(dimensions: tuple[LegDimension, ...], most: Floats, allowed: float,
-           cost: Mapping[DimensionPart, float]) -> Floats:
+def prices(dimensions: tuple[LegDimension, ...], cost: Mapping[str, float]) -> Floats:
+    """(E,) what each dimension costs: by its own name ("joint X1 z"), that of its point ("joint X1"), its part; else 1."""
+    def of(one: LegDimension) -> float:
+        names = (str(one), f"{one.part} {one.of}", one.part)
+        return next((cost[name] for name in names if name in cost), 1.0)
+    return np.array([of(one) for one in dimensions])
+
+
+def budget(dimensions: tuple[LegDimension, ...], most: Floats, allowed: float, cost: Mapping[str, float]) -> Floats:
     """Tolerances (E,), mm or rad, that keep the root of the sum of squares of all errors within `allowed` mm at least cost.
 
     With s the largest influence (E,) of each dimension and c / t paid for a tolerance t, the sum of c / t is least under
     sum (s t)^2 = allowed^2 where t = k (c / s^2)^(1/3). A dimension without influence has an infinite tolerance.
     """
-    price = np.array([cost.get(one.part, 1.0) for one in dimensions])
+    price = prices(dimensions, cost)
     counts = most > 1e-12
     shape = (price / np.where(counts, most, 1.0) ** 2) ** (1.0 / 3.0)
     whole = float(np.linalg.norm(np.where(counts, shape * most, 0.0)))

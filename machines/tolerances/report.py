@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from machines.machine import Machine
+from machines.tolerances.any_machine import MachinePositions, any_machine, positions_of
 from machines.tolerances.influence import (
     LargestInfluence,
+    P,
     budget,
     by_chance,
     by_point,
@@ -18,9 +20,11 @@ from machines.tolerances.influence import (
     largest,
     middle_of,
     poses_over,
+    prices,
     single,
 )
-from machines.tolerances.sensitivity import DimensionPart, LegDimension, RodsOfLegs
+from machines.tolerances.sensitivity import LegDimension, RodsOfLegs
+from machines.user_file import nearest
 from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
 from toolpaths.dataclass import dataclass
@@ -47,7 +51,7 @@ class ToleranceQuestion:
         spread: mm, of errors by chance; rad / 1000 of guides
         samples: of them
         allowed: mm, error of the tip that a budget has to keep; None: no budget
-        cost: of a tolerance of 1 mm (rad), by part; 1 where not given
+        cost: of a tolerance of 1 mm (rad), by part, point or dimension; 1 where not given
     """
 
     tool: float = 0.0
@@ -55,7 +59,7 @@ class ToleranceQuestion:
     spread: float = MICRO
     samples: int = 1000
     allowed: float | None = None
-    cost: Mapping[DimensionPart, float] = field(default_factory=dict)
+    cost: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,14 +82,8 @@ class ToleranceReport:
         if self.asked.allowed is not None:
             found = budget(self.dimensions, self.most.position, self.asked.allowed, self.asked.cost)
             for row, one, value in zip(rows, self.dimensions, found.tolist(), strict=True):
-                row["tolerance"] = value * (1e6 if one.part == "guide" else 1.0 / MICRO) if np.isfinite(value) else None
+                row["tolerance"] = value * (1e6 if one.angular else 1.0 / MICRO) if np.isfinite(value) else None
         return rows
-
-    @property
-    def head(self) -> str:
-        """Where an axis between platform and spindle stands for these figures, "" of machines without."""
-        legs = self.machine.kinematics.leg_geometry
-        return ", axis at the spindle at 0" if legs is not None and legs.head else ""
 
     @property
     def figures(self) -> dict[str, Any]:
@@ -94,11 +92,11 @@ class ToleranceReport:
         what = "once the rods are adjusted in the middle of the workspace" if asked.adjust else "as built"
         figures: dict[str, Any] = {
             "machine": self.machine.name, "tool_mm": asked.tool, "adjusted": asked.adjust,
-            "of": f"largest error of the tip (tool {asked.tool:g} mm{self.head}) at {self.poses} poses of the workspace, "
-                  f"{what}: position in um, turn in urad, per um, of guides per urad",
+            "of": f"largest error of the tip (tool {asked.tool:g} mm) at {self.poses} poses of the workspace, "
+                  f"{what}: position in um, turn in urad, per um, of guides and turns per urad",
             "dimensions": self.rows,
-            "points": [{"point": str(name), "position": _scaled(name.part, float(points.position[k])),
-                        "turn": float(points.turn[k] * (1.0 if name.part == "guide" else 1000.0))}
+            "points": [{"point": str(name), "position": _scaled(name, float(points.position[k])),
+                        "turn": float(points.turn[k] * (1.0 if name.angular else 1000.0))}
                        for k, name in enumerate(by_point(self.dimensions))],
             "by_chance": _chance(self.middle, asked, self.dimensions)}
         return figures | (_budget(self.dimensions, self.most, asked) if asked.allowed is not None else {})
@@ -142,31 +140,62 @@ def tolerances(machine: Machine, asked: ToleranceQuestion) -> ToleranceReport:
     """Influence of every dimension over the workspace, by dimension and by point, by chance, and a budget.
 
     Raises:
-        DiagnosticError: of a machine without legs.
+        DiagnosticError: of a kind without dimensions, of an adjustment without rods, of costs of what is not there.
     """
+    legs, parts = machine.kinematics.leg_geometry, machine.kinematics.clearance_parts
+    if legs is None or not legs.plain or parts is None or parts.clearance is None or machine.kinematics.axes_with_errors:
+        return _of_any(machine, asked)
     rods = rods_of(machine)
     point = rods.legs.gauge - np.array([0.0, 0.0, asked.tool])
-    dimensions, of = rods.dimensions, influence(rods, point, asked.adjust)
-    poses, middle = poses_over(rods.legs), middle_of(rods.legs)
+    return _report(machine, asked, rods.dimensions, influence(rods, point, asked.adjust), poses_over(rods.legs),
+                   middle_of(rods.legs))
+
+
+def _of_any(machine: Machine, asked: ToleranceQuestion) -> ToleranceReport:
+    """By the machine's model of geometric errors."""
+    whole = any_machine(machine, asked.tool)
+    if whole is None:
+        raise DiagnosticError([error("sensitivity.kind", f"nothing is known of errors of the dimensions of {machine.name}",
+                                     file=machine.file)])
+    if asked.adjust and not any(one.part == "rod" for one in whole.dimensions):
+        raise DiagnosticError([error("sensitivity.adjust", f"{machine.name} has no rods whose lengths could be adjusted",
+                                     file=machine.file, hint="leave --adjust out")])
+    positions = positions_of(machine, asked.tool)
+    middle, parts = positions.part(slice(0, 1)), machine.kinematics.leg_geometry
+    lever = 1000.0 if parts is None else parts.lever
+
+    def of(some: MachinePositions) -> Floats:
+        return whole.adjusted(some, middle, lever) if asked.adjust else whole.influence(some)
+    return _report(machine, asked, whole.dimensions, of, positions, middle)
+
+
+def _report(machine: Machine, asked: ToleranceQuestion, dimensions: tuple[LegDimension, ...], of: Callable[[P], Floats],
+            poses: P, middle: P) -> ToleranceReport:
+    known = {name for one in dimensions for name in (str(one), f"{one.part} {one.of}", one.part)}
+    unknown = [name for name in asked.cost if name not in known]
+    if unknown:
+        raise DiagnosticError([error("sensitivity.cost", f"{machine.name} has no dimension {unknown[0]!r}",
+                                     file=machine.file, hint=f"{nearest(unknown[0], sorted(known))} A part, a point or a "
+                                     "dimension of its table has a cost")])
     most = largest(of, poses, single(dimensions))
     points = largest(of, poses, tuple(by_point(dimensions).values()))
-    return ToleranceReport(machine, asked, dimensions, most, points, of(middle)[0], len(poses.place))
+    return ToleranceReport(machine, asked, dimensions, most, points, of(middle)[0], len(poses.pose))
 
 
-def _scaled(part: DimensionPart, value: float) -> float:
-    return value * (MICRO if part == "guide" else 1.0)
+def _scaled(one: LegDimension, value: float) -> float:
+    return value * (MICRO if one.angular else 1.0)
 
 
 def _row(one: LegDimension, most: LargestInfluence, k: int) -> dict[str, Any]:
     x, y, z, tilt, heading = most.position_at[k].tolist()
-    return {"dimension": str(one), "unit": "urad" if one.part == "guide" else "um",
-            "position": float(_scaled(one.part, most.position[k])),
-            "turn": float(most.turn[k] * (1.0 if one.part == "guide" else 1000.0)),
+    return {"dimension": str(one), "unit": "urad" if one.angular else "um",
+            "position": float(_scaled(one, most.position[k])),
+            "turn": float(most.turn[k] * (1.0 if one.angular else 1000.0)),
             "at_x_mm": x, "at_y_mm": y, "at_z_mm": z, "at_tilt_deg": tilt / DEG, "at_heading_deg": heading / DEG}
 
 
 def _spread(asked: ToleranceQuestion, dimensions: tuple[LegDimension, ...]) -> Floats:
-    return np.array([asked.spread * (1e-3 if one.part == "guide" else 1.0) for one in dimensions])
+    return np.array([asked.spread * (1e-3 if one.angular else 1.0) for one in dimensions])
 
 
 def _chance(s: Floats, asked: ToleranceQuestion, dimensions: tuple[LegDimension, ...]) -> dict[str, Any]:
@@ -185,7 +214,7 @@ def _chance(s: Floats, asked: ToleranceQuestion, dimensions: tuple[LegDimension,
 def _budget(dimensions: tuple[LegDimension, ...], most: LargestInfluence, asked: ToleranceQuestion) -> dict[str, Any]:
     allowed = asked.allowed or 0.0
     found = budget(dimensions, most.position, allowed, asked.cost)
-    price = np.array([asked.cost.get(one.part, 1.0) for one in dimensions])
+    price = prices(dimensions, asked.cost)
     even = allowed / float(np.linalg.norm(most.position))
     first = int(np.argmax(most.position * _spread(asked, dimensions)))
     return {"budget": {"allowed_um": allowed / MICRO, "cost": float((price / found).sum()),

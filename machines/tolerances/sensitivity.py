@@ -23,8 +23,9 @@ from toolpaths.dataclass import dataclass
 from toolpaths.rotations import cross, unit
 from toolpaths.shapes import arrays
 
-DimensionPart = Literal["drive", "guide", "foot", "joint", "rod"]
-"""what has an error: place of a drive, turn of its guide, joint of a rod at the drive and at the platform, its length"""
+DimensionPart = Literal["drive", "guide", "foot", "joint", "rod", "axis", "zero"]
+"""what has an error: place of a drive, turn of its guide, joint of a rod at the drive and at the platform, its length; the
+line of an axis, where a drive or an axis counts from"""
 PARTS: tuple[DimensionPart, ...] = ("drive", "guide", "foot", "joint", "rod")
 AXES = {"drive": "xyz", "guide": "abc", "foot": "tnu", "joint": "xyz", "rod": ""}
 """directions: of the machine; turns about them; tangential, inwards, along the guide; of the platform"""
@@ -40,6 +41,11 @@ class LegDimension:
 
     def __str__(self) -> str:
         return f"{self.part} {self.of} {self.axis}".rstrip()
+
+    @property
+    def angular(self) -> bool:
+        """True where its error is a turn, in rad."""
+        return self.part == "guide" or self.axis in ("a", "b", "c", "turn")
 
 
 @dataclass(frozen=True, eq=False)

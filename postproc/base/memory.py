@@ -1,12 +1,8 @@
-"""Memory that a finished stage leaves free goes back to the system, so that the next one does not come on top of it."""
+"""Memory that a finished stage leaves free is there for the next one."""
 
 from __future__ import annotations
 
 import sys
-
-MANY = 20_000
-"""moves or blocks from which on it pays: looking through what is free takes milliseconds, whatever is found"""
-
 
 LARGE = 1_000_000
 """bytes of a CL file from which on its arrays are so large that each would come from the system"""
@@ -26,17 +22,3 @@ def reuse(size: int) -> None:
     if mallopt is not None:
         mallopt(_MMAP_MAX, 0)
         mallopt(_TRIM_THRESHOLD, _KEPT)
-
-
-def give_back(rows: int) -> None:
-    """Ask the C library for it where it keeps what is free between blocks in use: glibc, malloc_trim(3).
-
-    `rows`: moves or blocks that the stage has worked on.
-    """
-    if rows < MANY or sys.platform != "linux":
-        return
-    import ctypes
-
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    if trim is not None:
-        trim(0)

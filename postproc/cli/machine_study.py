@@ -160,8 +160,9 @@ SamplesOption = Annotated[int, typer.Option("--samples", metavar="N", min=1, max
 ErrorOption = Annotated[float | None, typer.Option("--error", metavar="MM", min=1e-9, max=1e3,
                                                    help="budget: error of the tip that "
                                                    "the tolerances have to keep together")]
-CostOption = Annotated[list[str] | None, typer.Option("--cost", metavar="PART=COST", help="budget: cost of a tolerance of "
-                                                      "drive, guide, foot, joint or rod against the others, else 1")]
+CostOption = Annotated[list[str] | None, typer.Option("--cost", metavar="WHAT=COST", help="budget: cost of a tolerance of "
+                                                      "a part (rod, axis), a point (\"joint X1\") or a dimension "
+                                                      "(\"joint X1 z\") of the table against the others, else 1")]
 CsvFile = Annotated[Path | None, typer.Option("--csv", metavar="FILE", help="the table by dimension")]
 BarsFigure = Annotated[Path | None, typer.Option("--figure", metavar="FILE", help="influence of each point, .png or .svg")]
 
@@ -170,12 +171,11 @@ def machine_tolerance(name: Annotated[str, typer.Argument(help="name or TOML fil
                       adjust: AdjustOption = False, spread: SpreadOption = 1.0, samples: SamplesOption = 1000,
                       allowed: ErrorOption = None, cost: CostOption = None, csv: CsvFile = None, figure: BarsFigure = None,
                       json: Json = "") -> None:
-    """Influence of every dimension of a machine on legs on its tool, by place and by chance; tolerance budget."""
-    from machines.tolerances.sensitivity import DimensionPart
+    """Influence of every dimension of a machine on its tool, by place and by chance; tolerance budget."""
     from postproc.cli.error_files import pairs
 
     ending = figure_ending(figure)
-    prices = pairs("--cost", cost, get_args(DimensionPart))
+    prices = pairs("--cost", cost, [text.partition("=")[0] for text in cost or ()])
     if cost and allowed is None:
         raise typer.BadParameter("costs matter to a budget: give --error", param_hint="--cost")
     if any(value <= 0.0 for value in prices.values()):
@@ -186,8 +186,7 @@ def machine_tolerance(name: Annotated[str, typer.Argument(help="name or TOML fil
         from machines.tolerances.report import MICRO, ToleranceQuestion, tolerance_figure, tolerances
 
         machine = machine_of(name)
-        found = tolerances(machine, ToleranceQuestion(tool, adjust, spread * MICRO, samples, allowed, {
-            part: prices[part] for part in get_args(DimensionPart) if part in prices}))
+        found = tolerances(machine, ToleranceQuestion(tool, adjust, spread * MICRO, samples, allowed, prices))
     if csv is not None:
         outputs[csv] = found.csv
     if figure is not None and ending is not None:

@@ -124,7 +124,8 @@ def _seen(commanded: CommandedPath, path: BlendedPath, settings: ControlSettings
     read = np.cumsum(commanded.parts)
     last = np.minimum(np.searchsorted(read, read - commanded.parts + settings.buffer + EVEN, side="right"), n)
     room = np.maximum(path.ends[last] - path.ends[1:], 0.5 * np.diff(path.ends))
-    slope = np.abs(np.diff(commanded.points, axis=0)) / np.maximum(np.diff(path.ends), NO_MOTION)[:, None]
+    along = np.diff(path.ends)[:, None]  # 0 of a block that is too short to be a motion: it turns no axis
+    slope = np.where(along > 0.0, np.abs(np.diff(commanded.points, axis=0)) / np.maximum(along, NO_MOTION), 0.0)
     width = min(settings.buffer, n)
     steepest = maximum_filter1d(slope, width, axis=0, origin=-(width // 2), mode="nearest")
     most = np.maximum(steepest, NO_MOTION)

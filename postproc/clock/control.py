@@ -26,6 +26,9 @@ SLIGHT = 0.1
 """share of a jerk: bends that take less do not become slower"""
 GENTLE = 0.95
 """of the accelerations and jerks has the braking curve, so that the motion can come up to it from below"""
+GENTLER, LAST, AGAIN = (0.94, 0.93, 0.92, 0.9), 30, 160
+"""other such shares; cycles before a rest in which a motion that speeds up again has slowed down too early, and from which it
+is tried again"""
 BACKWARD = -0.94
 """cosine of the change of direction below which the axes rest: 160 degrees"""
 NEAR, LEAST = 2, 0.8
@@ -152,15 +155,33 @@ def between_rests(room: Allowed, first: int, last: int, settings: ControlSetting
 
 
 def _moved(part: Allowed, settings: ControlSettings) -> Floats:
-    """(M, 3) the motion from rest to rest under the largest speeds of a part."""
+    """(M, 3) the motion from rest to rest under the largest speeds of a part. Where it speeds up again before it rests, since
+    the cycle in which it began to slow down was half a one too late, it slows down otherwise by a little."""
+    moved = _run(part, settings, np.zeros(3) + [part.s[0], 0.0, 0.0], GENTLE)
+    late = moved[-LAST:]
+    if len(late) and (late[:, 2] > 0.0).any() and late[0, 2] < 0.0:
+        begin = max(len(moved) - AGAIN, 0)
+        for share in GENTLER:
+            again = np.concatenate([moved[:begin], _run(part, settings, moved[begin], share)])
+            moved = again if len(again) < len(moved) else moved
+    s = part.s
+    ahead = np.minimum.accumulate(part.cap[::-1])[::-1]
+    free = moved[:, 1] <= ahead[np.clip(np.searchsorted(s, moved[:, 0], side="right") - 1, 0, len(s) - 1)]
+    return landed(moved, float(s[-1]), settings.cycle, free)
+
+
+def _run(part: Allowed, settings: ControlSettings, begin: Floats, share: float) -> Floats:
+    """(M, 3) the motion from a state (3,) to rest, its braking curve under that share of the limits."""
+    first = max(int(np.searchsorted(part.s, begin[0], side="right")) - 1, 0)
+    part = part.between(first, len(part.s) - 1)
     s, v, a = part.s, np.empty(len(part.s)), np.empty(len(part.s))
     bends = part.dq, part.d2q, part.d3q, settings.acceleration, settings.jerks, part.straight
-    gentle = (*bends[:3], GENTLE * settings.acceleration, GENTLE * settings.jerks, GENTLE * part.straight)
+    gentle = (*bends[:3], share * settings.acceleration, share * settings.jerks, share * part.straight)
     chosen(slow_down, len(s), COMPILE_FROM)(s, part.cap, *gentle, v, a)
     rough = float((np.diff(s) / np.maximum((v[1:] + v[:-1]) / 2.0, SLOWEST)).sum())
     if rough > LONGEST:
         raise ArithmeticError(f"the motion takes {rough:.3g} s")
-    loop, state, made = chosen(run, len(s), COMPILE_FROM), np.array([s[0], 0.0, 0.0]), []
+    loop, state, made = chosen(run, len(s), COMPILE_FROM), begin.copy(), []
     while state[0] < s[-1] or state[1] > 0.0:
         out = np.empty((FEWEST + round(1.5 * rough / settings.cycle), 3))
         made.append(out[:loop(s, v, a, settings.cycle, *bends, state, out)])
@@ -170,10 +191,7 @@ def _moved(part: Allowed, settings: ControlSettings) -> Floats:
             break
         if len(made) > CALLS:
             raise ArithmeticError(f"no end is reached within {sum(map(len, made)) * settings.cycle:.3g} s")
-    moved = np.concatenate(made)
-    ahead = np.minimum.accumulate(part.cap[::-1])[::-1]
-    free = moved[:, 1] <= ahead[np.clip(np.searchsorted(s, moved[:, 0], side="right") - 1, 0, len(s) - 1)]
-    return landed(moved, float(s[-1]), settings.cycle, free)
+    return np.concatenate(made)
 
 
 def _jerk_used(part: Allowed, moved: Floats, settings: ControlSettings) -> Floats:

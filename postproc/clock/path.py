@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.clock.kernels import add_turns
+from postproc.clock.tangents import tangents
 from postproc.feedrate.paths import Derivatives
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.compiled import chosen
@@ -27,7 +28,7 @@ a curve"""
 EVEN, SLIGHT, ROUNDED = 1.5, 0.02, 0.003
 """on a curve a vertex turns at most EVEN times what both neighbours turn together, or SLIGHT rad, or what points rounded to
 0.001 mm may turn: ROUNDED mm over the shorter chord"""
-FEW_TURN, FEW_EVEN, FEW_SUM = 1.85, 5.0, 2.6
+FEW_TURN, FEW_EVEN, FEW_SUM = 1.85, 6.0, 2.6
 """a bend that few points show: what one vertex turns at most (2 sin of half the angle), how many times what both neighbours
 turn to the same side, and all three together (those of a square turn by 4.2: corners)"""
 BY_CHORD = 0.5
@@ -51,6 +52,8 @@ SMOOTH_BUMP = (140.0, -420.0, 420.0, -140.0)
 TAKES_BACK = 0.3
 """mm of an interval that takes back what the ones before went astray"""
 COMPILE_FROM = 30
+NOTHING = 1e-12
+"""mm, against division by 0"""
 
 
 @dataclass(frozen=True)
@@ -192,7 +195,7 @@ def fitted(path: CommandedPath) -> tuple[Floats, Floats, Floats, Ints]:
     u = step / chord[:, None]
     smooth, turn = _curved(u, chord, path)
     along = chord**BY_CHORD
-    first, last = _tangents(step / along[:, None], along, smooth)
+    first, last = tangents(u, chord, along, smooth)
     bend = np.maximum(np.concatenate([[0.0], np.where(smooth, turn, 0.0)]), np.append(np.where(smooth, turn, 0.0), 0.0))
     count = np.clip(np.ceil(bend / PIECE_TURN), 1, MOST_PIECES).astype(np.int64)
     owner = np.repeat(np.arange(len(u)), count)
@@ -242,36 +245,9 @@ def _turned_alike(u: Floats, turn: Floats) -> Floats:
     return result
 
 
-def _tangents(u: Floats, chord: Floats, smooth: Bools) -> tuple[Floats, Floats]:
-    """(N, A) derivatives at begin and end of each block: of cubic splines through smooth points, of one curvature in the
-    blocks in which they end (C. de Boor, A Practical Guide to Splines, 1978, chapter IV): where a curve ends at a corner it
-    bends up to there. Blocks of no curve are straight.
-
-    `chord` (N,) are the lengths of their parameter.
-    """
-    from scipy.linalg import solve_banded
-
-    n = len(u)
-    bands, right = np.zeros((4, 2 * n)), np.zeros((2 * n, u.shape[1]))
-    left, joined = np.concatenate([[False], smooth]), np.append(smooth, False)
-    begin, end = 2 * np.arange(n), 2 * np.arange(n) + 1
-    alone = np.where(left | joined, 1.0, 2.0)
-    slope = (1.0 + alone)[:, None] * u
-    bands[1, begin], bands[0, end], right[begin] = np.where(left, 2.0, alone), np.where(left, 0.0, 1.0), slope
-    bands[1, end], right[end] = np.where(joined, 1.0, alone), np.where(joined[:, None], 0.0, slope)
-    bands[2, begin] = np.where(joined, 0.0, 1.0)
-    k = np.flatnonzero(smooth)
-    bands[0, begin[k + 1]] = -1.0
-    before, behind = chord[k] / (chord[k] + chord[k + 1]), chord[k + 1] / (chord[k] + chord[k + 1])
-    bands[3, begin[k]], bands[0, end[k + 1]] = behind, before
-    right[begin[k + 1]] = 3.0 * (behind[:, None] * u[k] + before[:, None] * u[k + 1])
-    solved = solve_banded((2, 1), bands, right)
-    return solved[0::2], solved[1::2]
-
-
 def widths(flat: Floats, ends: Floats, tolerance: Floats, stops: Floats) -> Floats:
     """(P - 1,) width over which each inner point is smoothed: the widest whose mean deviates by at most the tolerance,
-    and all narrower ones too; it reaches over no rest."""
+    and all narrower ones too, between those that are tried by the ratio; it reaches over no rest."""
     s = ends[1:-1]
     if not len(s):
         return s
@@ -280,12 +256,16 @@ def widths(flat: Floats, ends: Floats, tolerance: Floats, stops: Floats) -> Floa
     before = s - stops[np.searchsorted(stops, s, side="right") - 1]
     behind = stops[np.minimum(np.searchsorted(stops, s, side="right"), len(stops) - 1)] - s
     room = 2.0 * np.minimum(before, behind)
-    result, alive = np.zeros(len(s)), np.flatnonzero((tolerance[1:-1] > 0.0) & (room > 0.0))
+    result, off = np.zeros(len(s)), np.zeros(len(s))
+    alive = np.flatnonzero((tolerance[1:-1] > 0.0) & (room > 0.0))
     for width in WIDTHS:
         w = np.minimum(width, room[alive])
         mean = (_integral(flat, whole, ends, s[alive] + w / 2) - _integral(flat, whole, ends, s[alive] - w / 2)) / w[:, None]
-        good = np.linalg.norm(mean - flat[alive + 1], axis=1) <= MEAN_SHARE * tolerance[alive + 1]
-        result[alive[good]] = w[good]
+        deviation, most = np.linalg.norm(mean - flat[alive + 1], axis=1), MEAN_SHARE * tolerance[alive + 1]
+        good = deviation <= most
+        between = np.where(good, 1.0, (most - off[alive]) / np.maximum(deviation - off[alive], NOTHING))
+        result[alive] += between * (w - result[alive])
+        off[alive] = deviation
         alive = alive[good & (width < room[alive])]
         if not len(alive):
             break

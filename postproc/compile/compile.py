@@ -47,9 +47,9 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
                                         job.setup.output.tool_call, job.setup.output.stop_between_tools, job.cutcom)
     contour, commands, refused = contour_words(job, moves, path, words, commands)
     cubics = cubic_blocks(job, moves, path, words, feeds, commands, skip if apart is None else skip | apart)
-    end = np.where(path.home[:, None], job.grid.trimmed(path.q * control.unit), contour.words.end)
+    end = np.where(path.home[:, None], job.grid.trimmed(path.q * control.unit), cubics.ended(contour.words.end, control.xyz))
     write = without_standing(contour.words.write, end, control.rolls)
-    write = cubics.written(write, words, control.xyz, job.grid.grain.min()) if len(cubics.last) else write
+    write = cubics.written(write, words, control.xyz, job.grid.grain.min()) if len(cubics.curves) else write
     keep = (write.any(axis=1) | (path.code == ARC)) & ~contour.dropped & ~cubics.dropped
     new = np.concatenate([[0], np.cumsum(keep)])
     sections = sections_of(job, moves, path, new)
@@ -64,7 +64,8 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
                       moves.row[path.move[keep]], line, placed, kept_holes, job.grid.places, sections, shared(skip[keep]),
                       shared(cubics.numbers()[keep]), cubics.curves,
                       control.rolls, control.machine.home * control.unit,
-                      tuple(a for a, turns in zip(control.machine.axis_names, control.machine.rotary, strict=True) if turns))
+                      tuple(a for a, turns in zip(control.machine.axis_names, control.machine.rotary, strict=True) if turns),
+                      shared(cubics.polygon.numbers(len(path))[keep]))
     found += [*refused, *long_turns(program, toolpath.file)]
     program = with_smoothing(program, job.smoothing, toolpath)
     program = with_clamps(program, control.machine, controller.plane_turns)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import field
+
 import numpy as np
 
+from postproc.compile.control_polygons import ControlPolygons, control_polygons
 from postproc.compile.feed import Feeds
 from postproc.compile.program import PER_MINUTE, Commands
 from postproc.compile.word_rows import WordRows, block_tools, unrounded_words
@@ -23,15 +26,17 @@ OFF = 0.5
 
 
 @dataclass(frozen=True)
-@arrays(first="C", last="C", curves="C 3 2", dropped="K")
+@arrays(first="B", last="B", curves="C 3 2", dropped="K")
 class CubicBlocks:
-    """Blocks that begin and end a cubic, `first`, `last` (C,), of which the last one is written; its coefficients (C, 3, 2)
-    as of `Program.curves`; blocks (K,) that it stands for."""
+    """Blocks that begin and end a cubic, `first`, `last` (B,), of which the last one is written, its coefficients (C, 3, 2)
+    as of `Program.curves`, or none where control points are; blocks (K,) that it stands for; blocks that state control
+    points."""
 
     first: Ints
     last: Ints
     curves: Floats
     dropped: Bools
+    polygon: ControlPolygons = field(default_factory=ControlPolygons)
 
     @staticmethod
     def none(blocks: int) -> CubicBlocks:
@@ -39,9 +44,20 @@ class CubicBlocks:
         no = np.zeros(0, dtype=np.int64)
         return CubicBlocks(no, no, np.zeros((0, 3, 2)), np.zeros(blocks, dtype=bool))
 
+    def ended(self, words: Floats, xyz: Ints) -> Floats:
+        """Words (K, J) in which blocks that state a control point end there."""
+        if not len(self.polygon.row):
+            return words
+        result = np.array(words)
+        result[self.polygon.row[:, None], xyz] = self.polygon.point
+        return result
+
     def written(self, write: Bools, words: WordRows, xyz: Ints, grain: float) -> Bools:
         """Words (K, J) that blocks state, of a cubic those in which it moves."""
         result = np.array(write)
+        if len(self.polygon.row):
+            result[self.polygon.row[:, None], xyz] = self.polygon.moves
+            return result
         moves = words.end[self.last][:, xyz] != words.start[self.first][:, xyz]
         result[self.last[:, None], xyz] = moves | (np.abs(self.curves).max(axis=2, initial=0.0) > grain)
         return result
@@ -67,24 +83,40 @@ def cubic_blocks(job: Job, moves: Moves, path: JointPath, words: WordRows, feeds
     held = _held(path, words, feeds, commands, apart)
     same = np.append(False, (np.diff(path.frame) == 0) & ~path.home[:-1])
     first, count = _pieces(inside, same)
-    done: list[tuple[Ints, Ints, Floats]] = []
+    points, done = job.machine.options.control_points, list[tuple[Ints, Ints, Floats]]()
     while len(first):
         whole = _unbroken(held, first, count)
         for n in np.unique(count[whole]).tolist():
             rows = first[whole & (count == n)]
             fits, curves = _fitted(job, moves, path, rows, n)
             done.append((rows[fits], np.full(int(fits.sum()), n), curves[fits]))
-        rest = ~whole & (count >= 2 * LEAST) & (count % 2 == 0)
+        rest = ~whole & (count >= 2 * LEAST) & (not points) & (count % 2 == 0)
         half = count[rest] // 2
         first, count = np.concatenate([first[rest], first[rest] + half]), np.concatenate([half, half])
     if not done:
         return none
     begin, size, curves = (np.concatenate(parts) for parts in zip(*done, strict=True))
     order = np.argsort(begin)
+    if points:
+        return _by_control_points(job, words, begin[order], size[order], curves[order])
     dropped = np.zeros(len(path) + 1, dtype=np.int64)
     np.add.at(dropped, begin, 1)
     np.add.at(dropped, begin + size - 1, -1)
-    return CubicBlocks(begin[order], (begin + size - 1)[order], curves[order], np.cumsum(dropped)[:-1] > 0)
+    return CubicBlocks(begin[order], (begin + size - 1)[order], curves[order][:, :, 2:], np.cumsum(dropped)[:-1] > 0)
+
+
+def _by_control_points(job: Job, words: WordRows, begin: Ints, size: Ints, terms: Floats) -> CubicBlocks:
+    """The same of whole splines with equal knots, by blocks that state control points."""
+    grid, xyz = job.grid, job.control.xyz
+
+    def rounded(points: Floats) -> Floats:
+        rows = np.zeros((len(points), len(grid.places)))
+        rows[:, xyz] = points
+        return np.asarray(grid.rounded(rows)[:, xyz])
+
+    polygon, dropped = control_polygons(begin, size, terms, words.end[:, xyz], rounded, OFF * float(grid.grain[xyz].min()))
+    kept = np.zeros((len(polygon.row), 3, 2))
+    return CubicBlocks(polygon.row[:0], polygon.row[:0], kept, dropped, polygon)
 
 
 def _held(path: JointPath, words: WordRows, feeds: Feeds, commands: Commands, apart: Bools) -> tuple[Bools, Bools]:
@@ -116,8 +148,8 @@ def _unbroken(held: tuple[Bools, Bools], first: Ints, count: Ints) -> Bools:
 
 
 def _fitted(job: Job, moves: Moves, path: JointPath, first: Ints, count: int) -> tuple[Bools, Floats]:
-    """(which of the runs (G,) of `count` blocks lie on a cubic, coefficients (G, 3, 2)) by their words before rounding:
-    least squares over all points."""
+    """(which of the runs (G,) of `count` blocks lie on a cubic, coefficients (G, 3, 4) from the constant on) by their words
+    before rounding: least squares over all points."""
     at = first[:, None] + np.arange(-1, count)
     rows = np.maximum(at, first[:, None]).ravel()
     words = unrounded_words(path, path.q[at.ravel()], rows, block_tools(path, moves), job.kinematics, job.offset_length)
@@ -126,4 +158,4 @@ def _fitted(job: Job, moves: Moves, path: JointPath, first: Ints, count: int) ->
     terms = np.einsum("kn,gnj->gkj", np.linalg.pinv(powers), points)
     off = np.abs(points - np.einsum("nk,gkj->gnj", powers, terms)).max(axis=(1, 2), initial=0.0)
     limit = OFF * float(job.grid.grain[job.control.xyz].min())
-    return np.asarray(off <= limit), np.stack([terms[:, 2], terms[:, 3]], axis=2)
+    return np.asarray(off <= limit), terms.transpose(0, 2, 1)

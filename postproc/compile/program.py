@@ -100,7 +100,7 @@ class Hole:
 
 @dataclass(frozen=True)
 @arrays(begins="_", words="K J", write="K J", code="int8: K", feed="K", mode="int8: K", plane="int8: K", ccw="K",
-        center="K 3", home="K", link="K", row="K", line="K", decimals="J", skip="K", curve="K", curves="C 3 2")
+        center="K 3", home="K", link="K", row="K", line="K", decimals="J", skip="K", curve="K", curves="C 3 2", spline="K")
 class Program:
     """K blocks with the commands before them.
 
@@ -122,6 +122,7 @@ class Program:
         curve (K,): number of the cubic that a block runs, -1 for none
         curves (C, 3, 2): its second and third coefficient in X, Y, Z, mm, the parameter going from 0 to 1; the first follows
             from begin and end of the block
+        spline (K,): number of the spline of which a block states a control point, -1 for none; its words are that point
         rolls: modulo axes by column; `words` count their turns, the text does not
         begins (J,): words of the machine's home
         turning: letters whose words are degrees; A, B and C may be slides of a platform on legs
@@ -151,12 +152,15 @@ class Program:
     rolls: dict[int, Rollover] = field(default_factory=dict)
     begins: Floats = field(default_factory=lambda: np.zeros(0))
     turning: tuple[str, ...] = ("A", "B", "C")
+    spline: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
         if not len(self.skip):
             object.__setattr__(self, "skip", np.zeros(len(self), dtype=bool))
         if not len(self.curve):
             object.__setattr__(self, "curve", np.full(len(self), -1))
+        if not len(self.spline):
+            object.__setattr__(self, "spline", np.full(len(self), -1))
 
     def before(self, axis: int) -> Floats:
         """(K,) degrees where a modulo axis stands before each block: as the block before has stated it last."""

@@ -69,6 +69,12 @@ class SplineRules(UserModel):
     """by which a program is known to hold such blocks; empty: the controller has none"""
     decimals: int = Field(default=6, ge=4, le=9)
     """of coefficients, mm or inches; where they have an exponent, of the mantissa"""
+    control_points: str = ""
+    """by which blocks state control points of a clamped cubic, the first one being where the tool stands; empty: none do"""
+    interval: str = ""
+    """stands in each of them: the same step between knots"""
+    relies_on: str = ""
+    """what a program with control points relies on, for its header"""
 
 
 class FeedRules(UserModel):

@@ -207,11 +207,11 @@ def _turned_in_travel(found: CorrectedEnds, path: JointPath, control: Control,
     limits = control.machine.limits
     inside = np.clip(found.q, limits.lower, limits.upper)
     inside = np.where((path.q >= limits.lower) & (path.q <= limits.upper), inside, found.q)
-    rows = np.flatnonzero((inside != found.q)[:, work.rotary].any(axis=1) & ~path.home)
+    rows = np.flatnonzero((inside != found.q)[:, work.turning].any(axis=1) & ~path.home)
     if not len(rows):
         return found
     q, after = found.q.copy(), found.after.copy()
-    q[rows] = work.at(path.q[rows], rows, work.approach[rows], inside[rows][:, work.rotary])
+    q[rows] = work.at(path.q[rows], rows, work.approach[rows], inside[rows][:, work.turning])
     left = work.residual(path.q[rows], q[rows], rows, work.approach[rows])
     after[rows] = np.linalg.norm(left.reshape(-1, 2, 3), axis=2)
     return replace(found, q=q, after=after)
@@ -262,7 +262,7 @@ def framed(path: JointPath, nominal: JointPath, modes: OutputModes, work: ErrorC
             frames.append(new)
         frame[k] = frames.index(new)
         q[whole] = work.at(nominal.q[whole], whole, work.approach[whole],
-                           np.tile(at[work.rotary], (len(whole), 1)))
+                           np.tile(at[work.turning], (len(whole), 1)))
     return replace(path, q=q, frame=frame, frames=tuple(frames))
 
 

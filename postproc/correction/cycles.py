@@ -67,8 +67,9 @@ def _sequences(path: JointPath, nominal: JointPath, hole: Ints, feeds: Bools,
     """Holes at one orientation with one tool in one frame, as runs of blocks; for each (H,) the first block
     of all that follow each other so; and blocks that lift the tool to the plane of the next, none of this but
     of the one before."""
-    runs, turns = RowRuns.of(hole), path.q[:, work.rotary]
+    runs, turns = RowRuns.of(hole), path.q[:, work.turning]
     same = np.append(False, (np.diff(path.frame) == 0) & (np.diff(work.tools) == 0) & (turns[1:] == turns[:-1]).all(axis=1))
+    same[1:] &= work.stands[1:]
     drills = np.logical_or.reduceat(feeds, runs.begin)
     fine = (hole[runs.begin] >= 0) & (runs.begin > 0) & drills & runs.throughout(same | (np.diff(hole, prepend=-2) != 0))
     joined = same[runs.begin] & np.append(False, fine[:-1])

@@ -67,8 +67,19 @@ class ErrorContext:
         self.approach: Floats = np.zeros(path.q.shape)
         self.drift: Floats = np.zeros(path.q.shape)
         self.rotary = np.array(kinematics(int(tools[0])).rotary)
-        self.group = one_orientation(path.q[:, self.rotary], tools, path.home)
+        self.turning = self.rotary & ~np.array(kinematics(int(tools[0])).in_loops)
+        """axes that hold the tool's direction while they stand: no cranks, which drive its tip"""
+        self.group = one_orientation(self.stands, tools, path.home) if self.turning.any() else np.full(len(path), ALONE)
         self._actual: dict[int, Actual] = {}
+
+    @cached_property
+    def stands(self) -> Bools:
+        """(K,) blocks that begin at the orientation at which they end: turning axes, and the nominal tool axis where slides
+        turn it too, stand as at the end of the block before."""
+        held = self.path.q[:, self.turning]
+        if self.kinematics(int(self.tools[0])).slides_turn_tool:
+            held = np.hstack([held, self.poses(self.path.q, np.arange(len(held)))[1]])
+        return np.append(False, (np.abs(np.diff(held, axis=0)) <= STANDS).all(axis=1))
 
     def actual(self, tool: int) -> Actual:
         """The machine with errors at the tip of a tool."""
@@ -273,18 +284,18 @@ class ErrorContext:
         _, first, inverse = np.unique(np.where(mine >= 0, mine, -2 - np.arange(len(mine))), return_index=True,
                                       return_inverse=True)
         result = q.copy()
-        result[:, self.rotary] = q[first[inverse]][:, self.rotary]
+        result[:, self.turning] = q[first[inverse]][:, self.turning]
         return result
 
     def at(self, q: Floats, blocks: Ints, approach: Floats, turns: Floats | None = None) -> Floats:
-        """Corrected joints (N, J) of nominal q (N, J) inside blocks (N,); `turns` (N, R) fixes the rotary axes."""
+        """Corrected joints (N, J) of nominal q (N, J) inside blocks (N,); `turns` (N, R) fixes the turning axes."""
         result = np.empty_like(q)
         for k in groups(self.tools[blocks]):
             tool = int(self.tools[blocks[k[0]]])
             tip, axis = self.kinematics(tool).forward(q[k])
             start = q[k].copy()
             if turns is not None:
-                start[:, self.rotary] = turns[k]
+                start[:, self.turning] = turns[k]
             result[k] = correct(self.actual(tool), start, tip, axis, direction=approach[k], turn=turns is None,
                                 axis_tolerance=self.axis_tolerance, beyond=self.beyond_inside[blocks[k]]).q
         return result
@@ -294,8 +305,8 @@ class ErrorContext:
 
         Blocks at one orientation keep it.
         """
-        ends = path.q[block - 1][:, self.rotary], path.q[block][:, self.rotary]
-        held: Bools = np.all(ends[0] == ends[1], axis=1)
+        ends = path.q[block - 1][:, self.turning], path.q[block][:, self.turning]
+        held: Bools = np.all(ends[0] == ends[1], axis=1) & self.turning.any() & self.stands[block]
         q = np.empty_like(there)
         for rows, fixed in ((np.flatnonzero(held), True), (np.flatnonzero(~held), False)):
             if len(rows):
@@ -341,9 +352,9 @@ def axis_positions(path: JointPath, tools: Ints) -> Bools:
     return np.asarray(same & law & ~path.home & ~np.append(False, path.home[:-1]))
 
 
-def one_orientation(turns: Floats, tools: Ints, home: Bools) -> Ints:
-    """(K,) number of the run of blocks at the same rotary joints (K, R) with the same tool; ALONE for single blocks."""
-    same = (np.abs(turns[1:] - turns[:-1]) <= STANDS).all(axis=1) & (tools[1:] == tools[:-1]) & ~home[1:] & ~home[:-1]
+def one_orientation(stands: Bools, tools: Ints, home: Bools) -> Ints:
+    """(K,) number of the run of blocks that keep their orientation (`stands`) with the same tool; ALONE for single blocks."""
+    same = stands[1:] & (tools[1:] == tools[:-1]) & ~home[1:] & ~home[:-1]
     run = np.concatenate([[0], np.cumsum(~same)])
     count = np.bincount(run)
     result: Ints = np.where(count[run] > 1, run, ALONE)

@@ -65,6 +65,10 @@ class Axes:
         return Axes(names, np.array(machine.rotary), limits.velocity, limits.acceleration, limits.jerk,
                     np.array([names.index(k) if k in names else -1 for k in "XYZ"]))
 
+    def points(self, rows: Floats) -> Floats:
+        """(K, 3) X, Y, Z of rows (K, A); 0 where there is no such axis."""
+        return np.where(self.xyz >= 0, rows[:, self.xyz], 0.0)
+
     def group(self, letters: str) -> Ints:
         """Columns whose letter is one of `letters`."""
         return np.array([j for j, name in enumerate(self.letters) if name in letters], dtype=np.int64)
@@ -172,8 +176,13 @@ class MotionBlocks:
     @property
     def xyz(self) -> Floats:
         """(E + 1, 3) X, Y, Z at the block ends, the first start first; 0 where there is no such axis."""
-        points = np.concatenate([self.start[:1], self.end])
-        return np.where(self.axes.xyz >= 0, points[:, self.axes.xyz], 0.0)
+        return self.axes.points(np.concatenate([self.start[:1], self.end]))
+
+    def xyz_before(self, rows: Ints) -> Floats:
+        """(K, 3) X, Y, Z at the ends of the blocks before `rows` (K,), the first start before the first."""
+        ends = self.end[np.maximum(rows - 1, 0)]
+        ends[rows == 0] = self.start[:1]
+        return self.axes.points(ends)
 
     @property
     def forced(self) -> Bools:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from postproc.base.memory import give_back
 from postproc.base.program_time import ControlPlan, ProgramTime
 from postproc.cycle_time.estimate import Estimate, estimate
 from postproc.cycle_time.model import CycleTimeModel, load_model, model_name
@@ -85,10 +84,7 @@ def estimate_of(result: PostResult, model: str = "", executed: bool = False) -> 
     if not result.ok:
         return None
     planner = _model(result, model) if executed else model_of(result, model)
-    rows = len(result.path) if result.path is not None else 0
-    give_back(rows)
     blocks = from_conversion(result)
-    give_back(rows)
     if not len(blocks):
         return None
     made = estimate(blocks, result.machine, planner, with_band=len(blocks) <= BAND_UP_TO)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.base.memory import give_back
 from postproc.cycle_time.blocks import Cause, CornerMode, MotionBlocks
 from postproc.cycle_time.linuxcnc_corners import KINK, BlendArcs, Corners, blends, corners
 from postproc.cycle_time.linuxcnc_kernels import next_begins, speeds, timeline
@@ -88,7 +87,6 @@ def linuxcnc(blocks: MotionBlocks, settings: Settings | None = None) -> BlockTim
     settings = settings or Settings()
     s = segments(blocks, settings.override, settings.rapid)
     row = in_a_row(s, settings.cycle)
-    give_back(len(s))
     return _timed(blocks, s, row, settings)
 
 
@@ -157,7 +155,7 @@ def _pull(s: PlannerSegments, rows: Ints, share: Floats) -> Floats:
     half the asked speed's centripetal part (`tcCircleStartAccelUnitVector`)."""
     tangent = _flat(s, s.shape.first, rows)
     radius = np.where(s.blocks.arc[rows], s.shape.radius[rows], 1.0)
-    spoke = s.blocks.xyz[rows] - s.blocks.center[rows]
+    spoke = s.blocks.xyz_before(rows) - s.blocks.center[rows]
     inward = -spoke / np.maximum(np.linalg.norm(spoke, axis=1, keepdims=True), 1e-300)
     normal = np.where(s.blocks.arc[rows], (0.5 * s.asked[rows]) ** 2 / radius, 0.0)
     pull = tangent * (s.acceleration * share)[rows][:, None] + inward * normal[:, None]

@@ -87,6 +87,8 @@ def merge(blocks: MotionBlocks) -> tuple[MotionBlocks, Ints]:
     for column in (blocks.speed, blocks.path, blocks.tolerance, blocks.chain):
         same &= np.concatenate([[False], column[1:] == column[:-1]])
     joins = line & ~turns & same & np.concatenate([[False], (line & ~turns & ~blocks.forced)[:-1]])
+    if not joins.any() and (blocks.start[1:] == blocks.end[:-1]).all():
+        return blocks, rows
     loop = chosen(chain_ends, len(blocks), KERNEL_FROM)
     keep = np.flatnonzero(loop(np.ascontiguousarray(blocks.xyz), joins, np.array(blocks.chain)))
     if len(keep) == len(blocks) and (blocks.start[1:] == blocks.end[:-1]).all():

@@ -103,20 +103,24 @@ def least_seconds(path: MachinePath, limits: JointLimits, feed: AllowedFeed, s: 
             constraint.JointAccelerationConstraint(np.stack((-limits.acceleration, limits.acceleration), axis=1),
                                                    discretization_scheme=both)]
     if limits.forces is not None:
-        rows.append(_force_rows(constraint.JointAccelerationConstraint, limits.forces, path, unit, both))
+        rows.append(_force_rows(constraint.JointAccelerationConstraint, limits.forces, path, (unit, cap / unit), both))
     speed = toppra.algorithm.TOPPRA(rows, made(), gridpoints=s / unit, solver_wrapper="seidel").compute_parameterization(
         0.0, 0.0, return_data=True)[1]
     return float(least_time(s / unit, speed**2))
 
 
-def _force_rows(base: Any, forces: MotorLimits, path: ParametricPath, unit: float,
+def _force_rows(base: Any, forces: MotorLimits, path: ParametricPath, scaled: tuple[float, Floats],
                 both: Any) -> Any:
-    """Limits of forces for toppra: its limits of acceleration, -1 to 1, of rows (a, b) in the place of (q', q'')."""
+    """Limits of forces for toppra: its limits of acceleration, -1 to 1, of rows (a, b) in the place of (q', q''), and what
+    is added to them; `scaled`: the unit of its parameter, the largest speeds in it at the grid points."""
+    unit, speed = scaled
+
     def used(_: object, made: object, gridpoints: Floats, *more: Any) -> Any:
         at = path.derivatives(np.clip(gridpoints * unit, path.start, path.end))
-        first, second = forces.rows(at.q, at.dq * unit, at.d2q * unit**2)
+        first, second, middle = forces.rows(at.q, at.dq * unit, at.d2q * unit**2, speed)
         stand_in = type("Rows", (), {"dof": first.shape[1], "__call__": lambda _, x, order: first if order == 1 else second})
-        return base.compute_constraint_params(rows, stand_in(), gridpoints, *more)
+        a, b, _, *rest = base.compute_constraint_params(rows, stand_in(), gridpoints, *more)
+        return a, b, np.column_stack((middle, np.vstack((middle[1:], middle[-1:])))), *rest
 
     joints = path.derivatives(np.array([path.start])).q.shape[1]
     made = type("Forces", (base,), {"compute_constraint_params": used})

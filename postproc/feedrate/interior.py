@@ -115,6 +115,8 @@ class NumpySteps:
         x = self.problem.basis.values(self.c)
         root = x[0] ** -0.5
         acceleration = np.einsum("ijk,ik->jk", self._a, x[:2])
+        if self.problem.middle is not None:
+            acceleration = acceleration + self.problem.middle
         jerk = np.einsum("ijk,ik->jk", self._j, x)
         return [1.0 - x[0] / self.problem.cap, 1.0 - acceleration, 1.0 + acceleration, root - jerk, root + jerk, self.c]
 

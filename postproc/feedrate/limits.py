@@ -41,8 +41,13 @@ class MotorLimits(Protocol):
         """(J,) about the acceleration of each joint that its force allows; infinite without a limit."""
         ...
 
-    def rows(self, q: Floats, dq: Floats, d2q: Floats) -> tuple[Floats, Floats]:
-        """(a, b), each (N, J): |a x'/2 + b x| <= 1 of the squared speed x along a path q (N, J) with these derivatives."""
+    def rows(self, q: Floats, dq: Floats, d2q: Floats, speed: Floats) -> tuple[Floats, Floats, Floats]:
+        """(a, b, o), each (N, J): |a x'/2 + b x + o| <= 1, |o| < 1, of the squared speed x along a path q (N, J) with these
+        derivatives, up to speeds (N,)."""
+        ...
+
+    def steady(self, q: Floats, dq: Floats, d2q: Floats) -> Floats:
+        """(N, J) largest constant speed along the path under each."""
         ...
 
     def standing(self, q: Floats) -> Floats:

@@ -49,13 +49,16 @@ def mesh(path: ParametricPath, limits: JointLimits, top: Callable[[Floats], Floa
     knots lie on these and grow from there and from rest, and its cruise, where nothing changes, takes the longest.
     """
     at = _probes(path, spacing, marks)
-    parts = [_probed(path, limits, top, at[i:i + CHUNK]) for i in range(0, len(at), CHUNK)]
-    speed, jerk = (np.concatenate(column) for column in zip(*parts, strict=True))
+    speed, bend = np.empty(len(at)), np.zeros(len(at))
+    for first in range(0, len(at), CHUNK):
+        low, high = max(first - 1, 0), min(first + CHUNK + 1, len(at))
+        speed[low:high], jerk = _probed(path, limits, top, at[low:high])
+        bend[low + 1:high - 1] = _bend(at[low:high], jerk)
     if not np.all(speed > 0.0):
         where = at[np.flatnonzero(~(speed > 0.0))[0]]
         raise ValueError(f"no speed above 0 is allowed at {where:.6g} of {path.end:.6g}: feed 0, or no finite derivatives")
     h = np.minimum(spacing.dt * speed, min(spacing.longest, (path.end - path.start) / FEWEST))
-    h[1:-1] = np.minimum(h[1:-1], np.sqrt(8.0 * spacing.hump / np.maximum(_bend(at, jerk), 1e-300)))
+    h[1:-1] = np.minimum(h[1:-1], np.sqrt(8.0 * spacing.hump / np.maximum(bend[1:-1], 1e-300)))
     with np.errstate(invalid="ignore"):
         h[[0, -1]] = np.fmin(h[[0, -1]], ramp / RAMP * speed[[0, -1]])
     if marks is not None:
@@ -139,19 +142,34 @@ def gentle(at: Floats, h: Floats, slope: float) -> Floats:
 
 def place(at: Floats, h: Floats) -> Floats:
     """Knots such that one knot passes per `h` of length: the integral of 1/h, exact for h linear between probes."""
-    step = np.diff(at)
-    low, high = h[:-1], h[1:]
+    passed = np.zeros(len(at))
+    for first in range(0, len(at) - 1, CHUNK):
+        last = min(first + CHUNK, len(at) - 1)
+        passed[first + 1:last + 1] = _passed(np.diff(at[first:last + 1]), h[first:last], h[first + 1:last + 1])
+    np.cumsum(passed, out=passed)
+    knots = np.linspace(0.0, passed[-1], int(np.ceil(passed[-1])) + 1)
+    for first in range(0, len(knots), CHUNK):
+        here = slice(first, first + CHUNK)
+        knots[here] = _reached(at, h, passed, knots[here])
+    knots[0], knots[-1] = at[0], at[-1]
+    return knots
+
+
+def _passed(step: Floats, low: Floats, high: Floats) -> Floats:
+    """Knots (N,) in steps between probes with spacings from `low` to `high`."""
     change = (high - low) / low
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(np.abs(change) > 1e-6, np.log1p(change) / change, 1.0 - 0.5 * change)
-    passed = np.append(0.0, np.cumsum(step / low * share))
-    wanted = np.linspace(0.0, passed[-1], int(np.ceil(passed[-1])) + 1)
-    cell = np.clip(np.searchsorted(passed, wanted, side="right") - 1, 0, len(step) - 1)
-    rate = (high - low)[cell] / step[cell]
-    ahead = (wanted - passed[cell]) * rate
+    return np.asarray(step / low * share)
+
+
+def _reached(at: Floats, h: Floats, passed: Floats, wanted: Floats) -> Floats:
+    """Places (M,) where `wanted` (M,) knots have passed."""
+    cell = np.clip(np.searchsorted(passed, wanted, side="right") - 1, 0, len(at) - 2)
+    low = h[cell]
+    rate = (h[cell + 1] - low) / (at[cell + 1] - at[cell])
+    behind = wanted - passed[cell]
+    ahead = behind * rate
     with np.errstate(divide="ignore", invalid="ignore"):
-        travel = np.where(np.abs(ahead) > 1e-6, low[cell] * np.expm1(ahead) / rate,
-                          low[cell] * (wanted - passed[cell]) * (1.0 + 0.5 * ahead))
-    knots = at[cell] + travel
-    knots[0], knots[-1] = at[0], at[-1]
-    return np.asarray(knots)
+        travel = np.where(np.abs(ahead) > 1e-6, low * np.expm1(ahead) / rate, low * behind * (1.0 + 0.5 * ahead))
+    return np.asarray(at[cell] + travel)

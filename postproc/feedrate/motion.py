@@ -27,21 +27,41 @@ CHUNK = 65536
 
 @dataclass(frozen=True)
 class MotionPiece:
-    """Motion between two stops; `shares` of its seconds, None at second order."""
+    """Motion between two stops, that of its profile `slowed` so many times; `shares` of its seconds, None at second order.
+
+    One factor instead of another profile: a motion that is slowed down takes no more memory.
+    """
 
     eased: Eased
     profile: Profile
     shares: LimitShares | None = None
+    slowed: float = 1.0
 
     @property
     def seconds(self) -> float:
         """Time from stop to stop."""
-        return float(self.profile.times[-1])
+        return self.slowed * float(self.profile.times[-1])
 
     def slower(self, factor: float) -> MotionPiece:
-        """The same motion, `factor` times as long."""
+        """The same motion, `factor` times as long: velocities fall by it, accelerations by its square, jerks by its cube."""
         shares = self.shares and self.shares.scaled(factor * self.shares.seconds)
-        return MotionPiece(self.eased, self.profile.slower(factor), shares)
+        return MotionPiece(self.eased, self.profile, shares, factor * self.slowed)
+
+    def at(self, t: Floats) -> Places:
+        """Places at rising times t (N,) of this piece; behind its end all stands still there."""
+        own = t / self.slowed
+        last = self.profile.times[-1]
+        at = self._in_time(self.profile.at(np.minimum(own, last)))
+        still = own > last
+        return Places(at.sigma, *(np.where(still, 0.0, rate) for rate in at[1:]))
+
+    def when(self, sigma: Floats) -> tuple[Floats, Places]:
+        """Times (N,) at which places sigma (N,) are passed, and the motion there."""
+        passed, at = self.profile.when(sigma)
+        return passed * self.slowed, self._in_time(at)
+
+    def _in_time(self, at: Places) -> Places:
+        return Places(at.sigma, *(rate / self.slowed**order for order, rate in enumerate(at[1:], start=1)))
 
 
 class StretchSpeeds(NamedTuple):
@@ -128,7 +148,7 @@ class Plan:
         time, speed = np.empty(len(s)), np.empty(len(s))
         for i, here in self._split(s):
             sigma = self.pieces[i].eased.sigma(s[here])
-            passed, at = self.pieces[i].profile.when(sigma)
+            passed, at = self.pieces[i].when(sigma)
             time[here] = passed + self.ends[i] - self.pieces[i].seconds
             speed[here] = at.speed * self.pieces[i].eased.parameter(sigma)[1]
         return time, speed
@@ -137,7 +157,7 @@ class Plan:
         """The motion at rising places s (N,) instead of equal times: joints, rates, what binds."""
         parts = []
         for i, here in self._split(s):
-            passed, at = self.pieces[i].profile.when(self.pieces[i].eased.sigma(s[here]))
+            passed, at = self.pieces[i].when(self.pieces[i].eased.sigma(s[here]))
             parts.append((passed + self.ends[i] - self.pieces[i].seconds, *self._states(i, at)))
         return JointTrajectory(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
@@ -176,16 +196,16 @@ class Plan:
 
     def _sampled(self, first: int, last: int) -> JointTrajectory:
         """Samples [first, last)."""
+        parts = [self._states(i, at) for i, at in self.places(first, last)]
+        t = np.float64(self.step) * np.arange(first, last)
+        return JointTrajectory(t, *(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+    def places(self, first: int, last: int) -> Iterator[tuple[int, Places]]:
+        """Samples [first, last) along the pieces: which piece, and the places in it; behind the end all stands still."""
         t = np.float64(self.step) * np.arange(first, last)
         which = np.minimum(np.searchsorted(self.ends, t, side="right"), len(self.ends) - 1)
-        parts = []
         for i in np.unique(which).tolist():
-            profile = self.pieces[i].profile
-            local = t[which == i] - (self.ends[i] - self.pieces[i].seconds)
-            at = profile.at(np.minimum(local, profile.times[-1]))
-            still = local > profile.times[-1]
-            parts.append(self._states(i, Places(at.sigma, *(np.where(still, 0.0, rate) for rate in at[1:]))))
-        return JointTrajectory(t, *(np.concatenate(column) for column in zip(*parts, strict=True)))
+            yield i, self.pieces[i].at(t[which == i] - (self.ends[i] - self.pieces[i].seconds))
 
     def _states(self, i: int, at: Places) -> tuple[Floats, ...]:
         """s, q, qd, qdd, qddd, ds/dt, feed, tool at places of piece i."""

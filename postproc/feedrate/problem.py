@@ -30,7 +30,7 @@ class SpeedProblem:
     `weight` (K,); `tight` (2, K) factors >= 1 on the acceleration and jerk rows; `shortest` (K,) the row whose
     acceleration the last row holds smooth (see `_smooth`), -1 without such a row. Per knot and joint
         velocity      1 - x/cap >= 0
-        acceleration  1 -+ (q'' x + q' x'/2)/A >= 0
+        acceleration  1 -+ ((q'' x + q' x'/2)/A + o) >= 0, o its `middle` (J, K), None: 0
         jerk          x^-1/2 -+ (q''' x + 3/2 q'' x' + 1/2 q' x'')/J >= 0
     """
 
@@ -46,6 +46,7 @@ class SpeedProblem:
     shortest: Ints
     forces: tuple[int, int] = (0, 0)
     """first row of forces, and how many there are, one a joint"""
+    middle: Floats | None = None
 
     @property
     def rows(self) -> int:
@@ -79,9 +80,22 @@ class SpeedProblem:
     def ratios(self, c: Floats) -> Floats:
         """Velocity, acceleration and jerk over their limits at the knots, the worst joint, tightening left out, (3, K)."""
         x = self.basis.values(c)
-        acceleration = np.abs(np.einsum("ijk,ik->jk", self.acceleration_rows(), x[:2])).max(axis=0) / self.tight[0]
-        jerk = np.abs(np.einsum("ijk,ik->jk", self.jerk_rows(), x)).max(axis=0) / self.tight[1]
+        used, jerk = self.used(x)
+        acceleration, jerk = self._taken(used).max(axis=0), np.abs(jerk).max(axis=0)
         return np.array([np.sqrt(x[0] / self.cap), acceleration, jerk * np.sqrt(x[0])])
+
+    def used(self, x: Floats, here: slice = slice(None)) -> tuple[Floats, Floats]:
+        """Of the limits, tightening left out: acceleration, and jerk over x^1/2, each (J, N), at knots `here`; x (3, N)."""
+        dq, d2q, d3q = self.dq[:, here], self.d2q[:, here], self.d3q[:, here]
+        half = 0.5 * dq
+        return ((d2q * x[0] + half * x[1]) / self.limits.acceleration[:, None],
+                (d3q * x[0] + 1.5 * d2q * x[1] + half * x[2]) / self.limits.jerk[:, None])
+
+    def _taken(self, used: Floats) -> Floats:
+        """(J, K) of what rows (J, K) may use on the side on which they do."""
+        if self.middle is None:
+            return np.abs(used)
+        return np.maximum(used / (1.0 - self.middle), -used / (1.0 + self.middle))
 
 
 @dataclass(frozen=True)
@@ -115,9 +129,10 @@ class MotionKnots:
         forces = at.dq.shape[1] - count, count
         at, shortest = _smooth(at, self.sigma[first:last], self._widest(first, last))
         dq, d2q, d3q = (np.ascontiguousarray(order.T) for order in at[:3])
+        middle = None if at.middle is None else np.ascontiguousarray(at.middle.T)
         basis = rest_basis(self.sigma, self.eased.ease, first, last)
         return SpeedProblem(basis, dq, d2q, d3q, at.limits, at.cap / tight[0] ** 2, at.capped,
-                            weight, tight[1:], shortest, forces)
+                            weight, tight[1:], shortest, forces, middle)
 
     def _widest(self, first: int, last: int) -> Floats:
         """The longer of the intervals before and behind each knot of [first, last)."""
@@ -150,8 +165,9 @@ def _smooth(at: LimitRows, sigma: Floats, widest: Floats) -> tuple[LimitRows, In
     wide = JointLimits(np.append(limits.velocity, np.inf), np.append(limits.acceleration, np.inf),
                        np.append(limits.jerk, 1.0), limits.tool, limits.forces)
     capped = np.where(at.capped == count, count + 1, at.capped)
+    middle = None if at.middle is None else np.column_stack((at.middle, zero))
     return LimitRows(np.column_stack((at.dq, row)), np.column_stack((at.d2q, zero)), np.column_stack((at.d3q, zero)),
-                     wide, at.cap, capped), short[steep.argmax(axis=1)]
+                     wide, at.cap, capped, middle), short[steep.argmax(axis=1)]
 
 
 def _reached(at: LimitRows, sigma: Floats) -> Floats:

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from postproc.feedrate.spline import Basis
+from postproc.feedrate.kernels.samples import passed
+from postproc.feedrate.spline import Basis, rest_basis
 from toolpaths.arrays import Floats, Ints
+from toolpaths.compiled import available, compiled
 from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
+CHUNK = 16384
+"""Knots handled at once."""
+KERNEL_FROM = 64
+"""Times at once from which the compiled loop finds their places."""
 _GAUSS = np.polynomial.legendre.leggauss(5)
+_UNIT_GAUSS = np.array([0.5 + 0.5 * _GAUSS[0], _GAUSS[1]])
 
 
 class Places(NamedTuple):
@@ -35,11 +44,11 @@ class Profile:
     @cached_property
     def times(self) -> Floats:
         """Time at the knots (K,): integral of x^-1/2; in closed form where x is linear, as it may then reach 0."""
-        return np.append(0.0, np.cumsum(self._spent(self.pieces, np.diff(self.sigma))))
-
-    def slower(self, factor: float) -> Profile:
-        """The same motion, `factor` times as long: velocities fall by it, accelerations by its square, jerks by its cube."""
-        return Profile(self.sigma, self.pieces / factor**2)
+        spent = np.zeros(len(self.sigma))
+        for first in range(0, len(spent) - 1, CHUNK):
+            here = slice(first, min(first + CHUNK, len(spent) - 1))
+            spent[first + 1:here.stop + 1] = self._spent(self.pieces[:, here], np.diff(self.sigma[first:here.stop + 1]))
+        return np.cumsum(spent, out=spent)
 
     def squared(self, k: Ints, travel: Floats) -> tuple[Floats, Floats, Floats]:
         """x, x', x'' at `travel` behind knots k."""
@@ -47,7 +56,7 @@ class Profile:
 
     @cached_property
     def _linear(self) -> bool:
-        return not np.any(self.pieces[2:])
+        return not any(np.any(row) for row in self.pieces[2:])
 
     def _spent(self, pieces: Floats, travel: Floats) -> Floats:
         """Time from the start of pieces (4, N) to `travel` behind it."""
@@ -61,7 +70,12 @@ class Profile:
         return np.asarray(0.5 * travel * total)
 
     def at(self, t: Floats) -> Places:
-        """Places at times t (N,) within [0, times[-1]]."""
+        """Places at rising times t (N,) within [0, times[-1]]."""
+        if len(t) >= KERNEL_FROM and not self._linear and available():  # by size alone, as the paths
+            out = np.empty((2, len(t)))
+            compiled(passed)(self.sigma, self.times, self.pieces, _UNIT_GAUSS, np.asarray(t, dtype=np.float64), out)
+            k, travel = out[0].astype(np.int64), out[1]
+            return _places(self.sigma[k] + travel, *_cubic(self.pieces[:, k], travel))
         k = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self.sigma) - 2)
         rest, h, pieces = t - self.times[k], self.sigma[k + 1] - self.sigma[k], self.pieces[:, k]
         a, b, c, d = pieces
@@ -103,6 +117,23 @@ def spline_profile(sigma: Floats, basis: Basis, c: Floats) -> Profile:
             pieces[2, k] = (3.0 * rise - 2.0 * x1[k] - x1[k + 1]) / h[k]
             pieces[3, k] = (x1[k] + x1[k + 1] - 2.0 * rise) / h[k] ** 2
     return Profile(sigma, pieces)
+
+
+def knots_profile(sigma: Floats, ease: float, c: Floats) -> Profile:
+    """Of a motion from rest to rest on knots sigma (K,) by coefficients (K + 2,)."""
+    pieces = np.empty((4, len(sigma) - 1))
+    for first, part in profile_parts(sigma, ease, c):
+        pieces[:, first:first + part.pieces.shape[1]] = part.pieces
+    return Profile(sigma, pieces)
+
+
+def profile_parts(sigma: Floats, ease: float, c: Floats, size: int = CHUNK) -> Iterator[tuple[int, Profile]]:
+    """The same in parts, each with its first knot."""
+    count = len(sigma)
+    cuts = np.linspace(0, count, max(1, count // size) + 1).astype(int)
+    for first, last in pairwise(cuts.tolist()):
+        stop = min(last + 1, count)
+        yield first, spline_profile(sigma[first:stop], rest_basis(sigma, ease, first, stop), c[first:stop + 2])
 
 
 def linear_profile(sigma: Floats, x: Floats) -> Profile:

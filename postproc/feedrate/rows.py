@@ -6,8 +6,8 @@ regular octagon inside it that touches it along +-t and +-n: on straight lines n
 elsewhere at most 1 - cos(pi/8) = 7.6 %. Where a twisted path has jerk in the plane and out of it at once,
 strict mode sees to their sum.
 
-Forces of motors depend on the place: |a x'/2 + b x| <= 1 is a row whose first and second derivatives are a and b, without
-a third.
+Forces of motors depend on the place and are not the same on both sides: |a x'/2 + b x + o| <= 1 is a row whose first and
+second derivatives are a and b, without a third, about the middle -o (`LimitRows.middle`).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class LimitRows(NamedTuple):
     """Derivatives by sigma (N, R), limits (R,) of acceleration and jerk, largest x = sigma_dot^2 (N,) and what caps it.
 
     Rows are the joints, behind them those of the tool, then those of forces, one a joint; `capped` (N,) is the joint, J for
-    the tool, R for the feed.
+    the tool, R for the feed. `middle` (N, R) is added to the accelerations over their limits, None: 0.
     """
 
     dq: Floats
@@ -43,6 +43,7 @@ class LimitRows(NamedTuple):
     limits: JointLimits
     cap: Floats
     capped: Ints
+    middle: Floats | None = None
 
 
 class ToolMotion(NamedTuple):
@@ -61,7 +62,9 @@ def rows(eased: Eased, sigma: Floats, limits: JointLimits, feed: Callable[[Float
     with np.errstate(divide="ignore"):
         speeds = limits.velocity / np.abs(at.dq)
     if limits.tool is None:
-        return _capped(*with_forces(at, limits), speeds, np.full(len(sigma), np.inf), allowed)
+        free = np.full(len(sigma), np.inf)
+        at, limits, middle = with_forces(at, limits, np.minimum(speeds.min(axis=1), allowed))
+        return _capped(at, limits, speeds, free, allowed)._replace(middle=middle)
     found = tool(eased, sigma, s)
     with np.errstate(divide="ignore"):
         binormal = limits.tool.jerk / np.abs(np.einsum("ij,ij->i", found.frame[2], found.tip.d3q))
@@ -71,20 +74,22 @@ def rows(eased: Eased, sigma: Floats, limits: JointLimits, feed: Callable[[Float
     velocity, acceleration, jerk = (np.append(old, np.full(4, new)) for old, new in (
         (limits.velocity, np.inf), (limits.acceleration, most[0]), (limits.jerk, most[1])))
     wide = JointLimits(velocity, acceleration, jerk, forces=limits.forces)
-    return _capped(*with_forces(both, wide), speeds, tilted, allowed)
+    both, wide, middle = with_forces(both, wide, np.minimum(np.minimum(speeds.min(axis=1), allowed), tilted))
+    return _capped(both, wide, speeds, tilted, allowed)._replace(middle=middle)
 
 
-def with_forces(at: Derivatives, limits: JointLimits) -> tuple[Derivatives, JointLimits]:
-    """The rows (N, R) and behind them those of the forces of the joints, where they are limited."""
+def with_forces(at: Derivatives, limits: JointLimits, speed: Floats) -> tuple[Derivatives, JointLimits, Floats | None]:
+    """The rows (N, R) and behind them those of the forces of the joints, where they are limited, at speeds up to (N,); their
+    middles."""
     if limits.forces is None:
-        return at, limits
+        return at, limits, None
     joints = at.q.shape[1]
-    first, second = limits.forces.rows(at.q, at.dq[:, :joints], at.d2q[:, :joints])
+    first, second, own = limits.forces.rows(at.q, at.dq[:, :joints], at.d2q[:, :joints], speed)
     columns = zip(at[1:], (first, second, np.zeros_like(first)), strict=True)
     free, one = np.full(joints, np.inf), np.ones(joints)
     most = JointLimits(np.append(limits.velocity, free), np.append(limits.acceleration, one), np.append(limits.jerk, free),
                        forces=limits.forces)
-    return Derivatives(at.q, *map(np.column_stack, columns)), most
+    return Derivatives(at.q, *map(np.column_stack, columns)), most, np.column_stack((np.zeros_like(at.dq), own))
 
 
 def forces_bind(eased: Eased, sigma: Floats, limits: JointLimits, feed: Callable[[Floats], Floats]) -> bool:
@@ -97,11 +102,11 @@ def forces_bind(eased: Eased, sigma: Floats, limits: JointLimits, feed: Callable
     for first in range(0, len(sigma), AT_ONCE):
         s = eased.inside(eased.parameter(sigma[first:first + AT_ONCE])[0])
         at = eased.path.derivatives(s)
-        a, b = (np.abs(row) for row in limits.forces.rows(at.q, at.dq, at.d2q))
         most = np.minimum(squared_speed(at.dq, limits.velocity), feed(s) ** 2)[:, None]
+        a, b, middle = (np.abs(row) for row in limits.forces.rows(at.q, at.dq, at.d2q, np.sqrt(most[:, 0])))
         with np.errstate(divide="ignore", invalid="ignore"):
             change = np.nanmin((limits.acceleration + np.abs(at.d2q) * most) / np.abs(at.dq), axis=1)
-            if not (a * change[:, None] + b * most <= FREE).all():
+            if not (a * change[:, None] + b * most <= FREE * (1.0 - middle)).all():
                 return True
     return False
 
@@ -109,8 +114,7 @@ def forces_bind(eased: Eased, sigma: Floats, limits: JointLimits, feed: Callable
 def steady_force_speed(eased: Eased, sigma: Floats, forces: MotorLimits) -> Floats:
     """Largest constant sigma_dot (N,) under limits of forces."""
     at = eased.derivatives(sigma)
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.sqrt(1.0 / np.abs(forces.rows(at.q, at.dq, at.d2q)[1]).max(axis=1)))
+    return np.asarray(forces.steady(at.q, at.dq, at.d2q).min(axis=1))
 
 
 def tool(eased: Eased, sigma: Floats, s: Floats) -> ToolMotion:

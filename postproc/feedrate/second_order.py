@@ -29,7 +29,7 @@ FLAT = 1e-8
 
 
 def second_order(sigma: Floats, dq: Floats, d2q: Floats, acceleration: Floats, cap: Floats,
-                 kernel: bool | None = None) -> Floats:
+                 kernel: bool | None = None, middle: Floats | None = None) -> Floats:
     """Squared speed x (N,) of least time between rest at both ends of the grid.
 
     Args:
@@ -37,6 +37,7 @@ def second_order(sigma: Floats, dq: Floats, d2q: Floats, acceleration: Floats, c
         acceleration: (J,) limits
         cap: (N,) largest x, from velocity and feed; may be inf where nothing moves
         kernel: whether the loop is compiled; by size if None
+        middle: (N, J) added to the accelerations over their limits, of magnitude below 1; None: 0
     """
     bound = np.array(cap, dtype=np.float64)
     bound[0] = bound[-1] = 0.0
@@ -46,7 +47,7 @@ def second_order(sigma: Floats, dq: Floats, d2q: Floats, acceleration: Floats, c
     first, second = (np.ascontiguousarray(order / acceleration) for order in (dq, d2q))
     run = compiled(sweep) if kernel else sweep
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        run(np.diff(sigma), first, second, bound, FLAT)
+        run(np.diff(sigma), first, second, np.zeros((1, dq.shape[1])) if middle is None else middle, bound, FLAT)
     return bound
 
 

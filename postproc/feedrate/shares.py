@@ -60,10 +60,8 @@ def weigh(problem: SpeedProblem, c: Floats, z: Multipliers, first: int, last: in
     velocity = 2.0 * z.velocity[here] * x[0] / problem.cap[here]
     found = np.zeros((3, count))
     found[0] = np.bincount(problem.capped[here], velocity, minlength=count)
-    for order, rows, multipliers in ((1, problem.acceleration_rows(), z.acceleration),
-                                     (2, problem.jerk_rows(), z.jerk)):
-        used = np.einsum("ijk,ik->jk", rows[:, :, here], x[:len(rows)])
-        cost = (order + 1) * multipliers[:, here] * used
+    for order, used, multipliers in zip((1, 2), problem.used(x, here), (z.acceleration, z.jerk), strict=True):
+        cost = (order + 1) * multipliers[:, here] * problem.tight[order - 1, here] * used
         found[order, :-1] = cost.sum(axis=1)
     smooth = problem.shortest[here]
     if (smooth >= 0).any():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -11,68 +12,84 @@ from postproc.feedrate.kernels.tightening import worst
 from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.paths import Derivatives
 from postproc.feedrate.problem import MotionKnots
-from postproc.feedrate.profile import Profile
+from postproc.feedrate.profile import Profile, profile_parts
 from postproc.feedrate.rows import tool
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Floats, Ints
 from toolpaths.compiled import compiled
 
 ENOUGH = 1.002
-"""Ratio between knots that is left to the final slowing down."""
-MORE = 1.6
+"""Ratio between knots that is left to the final slowing down: less than a thousandth of the time."""
+MORE = 2.0
 """Power of the excess by which rows are tightened: a peak between knots falls by some 60 % of what its knots do."""
 BETWEEN = (0.25, 0.5, 0.75)
 SPLIT = (1.5, 1.5, 1.02, 1.02)
 """Ratios between knots from which an interval is halved, by the number of tightenings before."""
-CHUNK = 16384
+CHUNK = 4096
+"""intervals looked at together"""
 
 
-def tightened(grid: MotionKnots, profile: Profile, split_from: float,
-              kernel: bool = False) -> tuple[float, MotionKnots | None]:
-    """Factor on time that brings what is seen between the knots to 1; a better grid, None where nothing is exceeded.
+Ratios = npt.NDArray[np.float32]
 
-    The better grid has tighter rows, and more knots where the ratio is above `split_from`: where tightening
-    was in vain, as a spline of the path bends within one interval.
+
+class Tighter(NamedTuple):
+    """Knots with tighter rows, and new ones behind the knots `behind` of before where that was in vain."""
+
+    grid: MotionKnots
+    behind: Ints
+
+
+def seen_between(grid: MotionKnots, c: Floats, kernel: bool = False) -> tuple[Ratios, float]:
+    """Velocity, acceleration and jerk over their limits, (3, K - 1), the worst between each two knots; seconds of the motion
+    with coefficients c (K + 2,)."""
+    seen, seconds = np.empty((3, len(grid.sigma) - 1), dtype=np.float32), 0.0
+    for first, part in profile_parts(grid.sigma, grid.eased.ease, c, CHUNK):
+        seen[:, first:first + part.pieces.shape[1]] = _ratios(grid, part, kernel)
+        seconds += float(part.times[-1])
+    return seen, seconds
+
+
+def slowdown(seen: Ratios) -> float:
+    """Factor on time that brings what is seen between the knots to 1."""
+    velocity, acceleration, jerk = seen.max(axis=1).tolist()
+    return max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0))
+
+
+def tighter(grid: MotionKnots, seen: Ratios, split_from: float) -> Tighter | None:
+    """Tighter rows next to what is exceeded; None where nothing is. `seen` is used up.
+
+    There are more knots where the ratio is above `split_from`: where tightening was in vain, as a spline of the path bends
+    within one interval.
     """
-    excess = np.empty((3, len(grid.sigma) - 1), dtype=np.float32)
-    for first in range(0, excess.shape[1], CHUNK):
-        here = np.arange(first, min(first + CHUNK, excess.shape[1]))
-        excess[:, here] = _ratios(grid, profile, here, kernel)
-    velocity, acceleration, jerk = excess.max(axis=1).tolist()
-    slower = max(velocity, acceleration**0.5, jerk ** (1.0 / 3.0))
-    if max(velocity, acceleration, jerk) <= ENOUGH:
-        return slower, None
-    split = excess.max(axis=0) > split_from
-    np.power(np.maximum(excess, 1.0, out=excess), MORE, out=excess)
+    over = seen.max(axis=0)
+    if over.max() <= ENOUGH:
+        return None
+    excess = np.power(np.maximum(seen, 1.0, out=seen), MORE, out=seen)
     tight = np.ones((3, len(grid.sigma)), dtype=np.float32)
     tight[:, :-1] = excess
     np.maximum(tight[:, 1:], excess, out=tight[:, 1:])
     if grid.tight is not None:
         tight *= grid.tight
-    return slower, _split(grid, tight, split) if split.any() else replace(grid, tight=tight)
+    behind = np.flatnonzero(np.convolve(over > split_from, np.ones(3), mode="same") > 0.0)
+    if not len(behind):
+        return Tighter(replace(grid, tight=tight), behind)
+    middle = 0.5 * (grid.sigma[behind] + grid.sigma[behind + 1])
+    return Tighter(replace(grid, sigma=np.insert(grid.sigma, behind + 1, middle),
+                           tight=np.insert(tight, behind + 1, 1.0, axis=1)), behind)
 
 
-def _split(grid: MotionKnots, tight: npt.NDArray[np.float32], split: Bools) -> MotionKnots:
-    """Intervals `split` (K - 1,) and their neighbours halved, tightened by `tight`, and not at the new knots."""
-    wide = np.convolve(split, np.ones(3), mode="same") > 0.0
-    where = np.flatnonzero(wide)
-    middle = 0.5 * (grid.sigma[where] + grid.sigma[where + 1])
-    return replace(grid, sigma=np.insert(grid.sigma, where + 1, middle), tight=np.insert(tight, where + 1, 1.0, axis=1))
-
-
-def _ratios(grid: MotionKnots, profile: Profile, k: Ints, kernel: bool) -> Floats:
-    """Velocity (feed included), acceleration and jerk over their limits, (3, N), the worst BETWEEN ends of intervals k."""
-    travel = ((grid.sigma[k + 1] - grid.sigma[k])[:, None] * BETWEEN).ravel()
-    k = np.repeat(k, len(BETWEEN))
-    sigma = grid.sigma[k] + travel
+def _ratios(grid: MotionKnots, part: Profile, kernel: bool) -> Floats:
+    """Velocity (feed included), acceleration and jerk over their limits, (3, N), the worst BETWEEN ends of intervals."""
+    travel = (np.diff(part.sigma)[:, None] * BETWEEN).ravel()
+    k = np.repeat(np.arange(len(part.sigma) - 1), len(BETWEEN))
+    sigma = part.sigma[k] + travel
     s = grid.eased.parameter(sigma)
     at = grid.eased.chained(sigma, s, grid.eased.path.derivatives(grid.eased.inside(s[0])))
-    x = np.array(profile.squared(k, travel))
+    x = np.array(part.squared(k, travel))
     limits, speed = grid.limits, np.sqrt(x[0])
     ratios = worst_ratios(at, x, limits, kernel)
     ratios[0] = np.maximum(ratios[0], s[1] * speed / grid.feed(s[0]))
     if limits.forces is not None:
-        first, second = limits.forces.rows(at.q, at.dq, at.d2q)
-        ratios[1] = np.maximum(ratios[1], np.abs(second * x[0][:, None] + 0.5 * first * x[1][:, None]).max(axis=1))
+        ratios[1] = np.maximum(ratios[1], limits.forces.use(at.q, *_in_time(at, x)[:2]).max(axis=1))
     if limits.tool is not None:
         known = tool(grid.eased, sigma, s)
         _, bend, snap = (np.linalg.norm(rate, axis=1) for rate in _in_time(known.tip, x))

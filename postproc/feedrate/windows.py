@@ -18,12 +18,13 @@ import numpy as np
 from postproc.feedrate.interior import InteriorSolution, NewtonSteps, NumpySteps, solve
 from postproc.feedrate.problem import MotionKnots, SpeedProblem
 from postproc.feedrate.shares import weigh
+from postproc.feedrate.spline import Basis
 from toolpaths.arrays import Floats
 from toolpaths.compiled import available
 from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
-WINDOW, OVERLAP = 8192, 1024
+WINDOW, OVERLAP = 8192, 512
 """Knots of a window, and on each side beyond it."""
 APART, OVER = 1e-3, 1.002
 """Relative difference of neighbours, and ratio to a limit in the blend, from which the overlap is widened."""
@@ -31,8 +32,9 @@ WIDEST = 16
 """Times the asked overlap beyond which it is not widened."""
 
 
-COLD, WARM = 5.0, 0.03
-"""First gap over time, from a slow start and from a similar motion."""
+COLD, WARM = 5.0, 1.0
+"""First gap over time, from a slow start and from a similar motion; far below it the motion is hemmed in before it can
+grow, and takes up to three times the steps."""
 
 
 @dataclass(frozen=True)
@@ -73,16 +75,19 @@ class SolvedWindows:
     mismatch: float
     solved: bool
     weights: Floats
+    basis: Basis | None = None
+    """of all knots, where one window is the whole"""
 
 
 class WindowSolution(NamedTuple):
-    """A window's first knot, coefficients, iterations, success, and the seconds of the rows in its own part."""
+    """A window's first knot, coefficients, iterations, success, the seconds of the rows in its own part, its basis."""
 
     first: int
     c: Floats
     iterations: int
     solved: bool
     weights: Floats
+    basis: Basis | None
 
 
 def solved(knots: MotionKnots, method: Method, near: Floats | None = None) -> SolvedWindows:
@@ -92,7 +97,7 @@ def solved(knots: MotionKnots, method: Method, near: Floats | None = None) -> So
     inner = np.linspace(0, count, max(1, round(count / method.window)) + 1).astype(int).tolist()
     windows = list(pairwise(inner))
     wide = [method.overlap] * len(windows)
-    found = [WindowSolution(0, np.empty(0), 0, False, np.empty(0))] * len(windows)
+    found = [WindowSolution(0, np.empty(0), 0, False, np.empty(0), None)] * len(windows)
     again = list(range(len(windows)))
     while again:
         _solve_some(knots, windows, wide, again, found, make, method.threads, near)
@@ -101,7 +106,7 @@ def solved(knots: MotionKnots, method: Method, near: Floats | None = None) -> So
         for i in again:
             wide[i] *= 2
     return SolvedWindows(_held(knots, c, inner) if bad else c, max(one.iterations for one in found), worst,
-                         not bad and all(one.solved for one in found), np.sum([one.weights for one in found], axis=0))
+                         not bad and all(one.solved for one in found), np.sum([one.weights for one in found], axis=0), found[0].basis)
 
 
 def _held(knots: MotionKnots, c: Floats, inner: Sequence[int]) -> Floats:
@@ -124,7 +129,8 @@ def _solve_some(knots: MotionKnots, windows: Sequence[tuple[int, int]], wide: Se
         problem = knots.problem(first, last)
         one = solve_problem(problem, make, None if near is None else near[first:last + 2])
         weights = weigh(problem, one.c, one.multipliers, windows[i][0] - first, windows[i][1] - first)
-        found[i] = WindowSolution(first, one.c, one.iterations, one.solved, weights)
+        found[i] = WindowSolution(first, one.c, one.iterations, one.solved, weights,
+                                  problem.basis if len(windows) == 1 else None)
 
     if threads > 1 and len(which) > 1:
         with ThreadPoolExecutor(threads) as pool:

@@ -11,7 +11,6 @@ import postproc.joints.faults as joint_faults
 import postproc.path.faults as faults
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
-from postproc.base.memory import give_back
 from postproc.base.progress import Progress
 from postproc.control.modes import OutputModes, WordFrame
 from postproc.joints.run_plan import RunPlan, plan_moves
@@ -91,14 +90,14 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
     _add_end(out, modes, stand, space, len(moves) - 1)
     out.begin[len(moves)] = out.count
     columns = out.joined()
-    give_back(len(moves))
     path = _of_given(columns, out, plan, len(given), np.concatenate(turns), worst, start.kin.open_parameters)
     diagnostics += joint_faults.planned(plan, machine, given, file)
     if path.opened:
         diagnostics.append(info("joints.opened", joint_faults.opened(path.opened, path.split_seconds), file=file))
     diagnostics += cost(modes.tcp_code, longer, file)
     return path, faults.merged(diagnostics) + faults.off_line(path.code, path.u, path.move, path.seconds,
-                                                              given, file, rapids_as_feed)
+                                                              given, file, rapids_as_feed,
+                                                              bool(modes.tcp_code) and any(machine.rotary))
 
 
 def _of_given(columns: dict[str, Array], out: PathBuilder, plan: RunPlan, count: int, turns: Ints,

@@ -148,9 +148,9 @@ def broken(machine: Machine, moves: Moves, rows: Ints, q: Floats, file: str) -> 
 
 
 def off_line(code: Array, u: Floats, move: Ints, seconds: Floats, moves: Moves, file: str,
-             rapids_as_feed: bool) -> list[Diagnostic]:
+             rapids_as_feed: bool, by_tip: bool) -> list[Diagnostic]:
     """Rapids that are feed moves (code 1, no time of their own), as the control would leave their line; an error where that
-    is not asked for. `u` (K,) is NaN for linking blocks."""
+    is not asked for. `u` (K,) is NaN for linking blocks; `by_tip`: control and machine have the tip's mode."""
     rows = np.flatnonzero((code == 1) & (seconds == 0.0) & ((moves.kind[move] == Kind.RAPID) | np.isnan(u)))
     if not len(rows):
         return []
@@ -163,4 +163,5 @@ def off_line(code: Array, u: Floats, move: Ints, seconds: Floats, moves: Moves, 
                   "(dog-leg), and no safe path of single axes is known", file=file, lines=lines[:6].tolist(),
                   count=len(lines), hint='write rapids = "straight" under [control] of the machine file where the control '
                   "keeps rapids straight (Fanuc 1401#1 LRP = 1, Haas setting 335), or rapids_as_feed = true under [output] "
-                  "of the set-up for G1 at the speed of the slowest axis, or convert with --output-mode tcp")]
+                  "of the set-up for G1 at the speed of the slowest axis"
+                  + ", or convert with --output-mode tcp" * by_tip)]

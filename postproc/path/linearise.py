@@ -14,7 +14,7 @@ from machines.kinematics.base import Kinematics
 from postproc.control.control import Control
 from postproc.joints.joint_path import branch_of, nearest_solution
 from postproc.path.bound import CurveBlocks, settled_bounds
-from toolpaths.arrays import Bools, Floats, Ints, distinct
+from toolpaths.arrays import Bools, Floats, Ints, distinct, without_nan
 from toolpaths.dataclass import dataclass
 from toolpaths.rotations import angle_between, wrap
 from toolpaths.shape import Curves
@@ -265,7 +265,8 @@ def approached(kin: Kinematics, curves: Curves, q0: Floats, q1: Floats) -> tuple
     right angles it has the value from before, with nutating ones it has not."""
     rows = np.zeros(0, dtype=np.int64)
     if any(kin.rotary):
-        rows = np.flatnonzero(kin.singular(np.nan_to_num(q1)) & ~kin.singular(np.nan_to_num(q0)))
+        rows = np.flatnonzero(kin.singular(without_nan(q1)))
+        rows = rows[~kin.singular(without_nan(q0[rows]))]
     if not len(rows):
         return rows, q1[:0]
     limit = _limit(kin, curves.take(rows), q0[rows], 1.0)

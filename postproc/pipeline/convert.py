@@ -34,6 +34,7 @@ from postproc.verification.neighbour_files import NeighbourFiles, unfinished
 from postproc.verification.read_back import other_axes, other_setup, read_back
 from postproc.verification.second_witness import second_witness
 from postproc.verification.stated_numbers import check_header, stated_smoothing
+from toolpaths.choices import CubicPieces
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, has_errors, read_value
 from toolpaths.input_files import read_input, unreadable
 from toolpaths.toolpath import Toolpath
@@ -63,7 +64,8 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
     require_call(path, options)
     spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
     found = _reading(path, diagnostics)
-    native = with_cubics(path, options) if asked_splines(path, machine, spec, options) else path
+    kind: CubicPieces = "uniform" if machine.options.control_points else "pieces"
+    native = with_cubics(path, options, kind) if asked_splines(path, machine, spec, options) else path
     made = _converted(_begun(native, machine, controller, spec, setup, options, found), progress, clock)
     held = made.ok and made.program is not None and len(made.program.curves) > 0
     if held or native is path:
@@ -200,7 +202,7 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
                          hashlib.sha256(data).hexdigest())
     if other := other_axes(data, options, str(gcode)):
         return replace(begun, diagnostics=(*other, *known))
-    path = with_cubics(path, options) if held_near(data, NeighbourFiles(gcode), spec) else path
+    path = with_cubics(path, options, held_near(data, NeighbourFiles(gcode), spec))
     start, _ = _oriented(_begun(path, machine, controller, spec, setup, options, known), progress, clock)
     path, found = start.toolpath, list(start.diagnostics)
     if has_errors(found):

@@ -9,7 +9,7 @@ from pathlib import Path
 from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.controllers.model import ControllerFile
-from toolpaths.choices import ShopName
+from toolpaths.choices import CubicPieces, ShopName
 from toolpaths.cl.curves import SPLINE_SHARE
 from toolpaths.cl.read import read_bytes
 from toolpaths.diagnostics import Diagnostic, Severity, warning
@@ -23,35 +23,40 @@ _BEFORE = rb"^[ \t/]*(?:N?\d+)?[ \t/]*(?:G\d+[ \t]+)*"
 def asked_splines(path: Toolpath, machine: Machine, controller: ControllerFile, options: Options) -> bool:
     """True where splines of a path may be written as cubics: the machine file says that the option is fitted, points are
     written as they stand, and no radius compensation shifts them."""
-    if not machine.options.confirmed("splines") or not controller.splines.word or not path.spline_slack:
+    word = controller.splines.control_points if machine.options.control_points else controller.splines.word
+    if not machine.options.confirmed("splines") or not word or not path.spline_slack:
         return False
     return not (options.smooth or options.error_model or options.feed == "planned" or options.feed_mode == "inverse-time"
                 or any(event.word in _SHIFTED for event in path.events))
 
 
-def held_splines(data: bytes, controller: ControllerFile) -> bool:
-    """True where a program holds blocks that run a cubic: their word behind what numbers and skips a block, and G codes."""
-    word = controller.splines.word.encode()
-    return bool(word) and re.search(_BEFORE + re.escape(word) + rb"(?![A-Z0-9_])", data.upper(), re.MULTILINE) is not None
+def held_splines(data: bytes, controller: ControllerFile) -> CubicPieces:
+    """Which blocks that run cubics a program holds: their word behind what numbers and skips a block, and G codes; "" for
+    none."""
+    kinds: tuple[tuple[str, CubicPieces], ...] = ((controller.splines.control_points, "uniform"),
+                                                  (controller.splines.word, "pieces"))
+    return next((kind for word, kind in kinds if word and re.search(
+        _BEFORE + re.escape(word.encode()) + rb"(?![A-Z0-9_])", data.upper(), re.MULTILINE)), "")
 
 
-def held_near(data: bytes, others: Mapping[str, bytes], controller: ControllerFile) -> bool:
-    """True where a program, or a subprogram in a file next to it whose name stands in its blocks, holds such blocks."""
-    if not controller.splines.word or held_splines(data, controller):
-        return bool(controller.splines.word)
+def held_near(data: bytes, others: Mapping[str, bytes], controller: ControllerFile) -> CubicPieces:
+    """The same of a program, or of a subprogram in a file next to it whose name stands in its blocks."""
+    if not controller.splines.word or (kind := held_splines(data, controller)):
+        return kind if controller.splines.word else ""
     words = set(re.findall(rb"[A-Z0-9_]+", re.sub(rb";[^\n]*", b"", data.upper())))
-    return any(Path(name).stem.upper().encode() in words and held_splines(others[name], controller) for name in others)
+    found = (held_splines(others[name], controller) for name in others if Path(name).stem.upper().encode() in words)
+    return next((kind for kind in found if kind), "")
 
 
-def with_cubics(path: Toolpath, options: Options) -> Toolpath:
-    """The path as reading its file gives it with cubics; itself, with arcs and chords, where it comes from no file, was
-    changed, or where the file is another one with these options."""
+def with_cubics(path: Toolpath, options: Options, kind: CubicPieces) -> Toolpath:
+    """The path as reading its file gives it with cubics of a kind; itself, with arcs and chords, where it comes from no
+    file, was changed, or where the file is another one with these options."""
     source = path.source
-    if source is None or not path.spline_slack:
+    if source is None or not path.spline_slack or not kind:
         return path
     asked = source.dialect or None if source.plug_in is None else ShopName(source.plug_in.name)
     read = read_bytes(source.data, file=path.file, units=source.units or None, dialect=asked,
-                      allow_unknown=options.allow_unknown, tolerance=path.spline_slack / SPLINE_SHARE, cubics=True)
+                      allow_unknown=options.allow_unknown, tolerance=path.spline_slack / SPLINE_SHARE, cubics=kind)
     return read.toolpath if len(read.toolpath.faults) == len(path.faults) else path
 
 

@@ -317,10 +317,11 @@ def _too_weak(motion: PlannedMotion) -> list[Diagnostic]:
             worst = float(shares[k, j]), names[int(j)], int(source.path.move[one.block[k]])
     if worst[0] <= 1.0 - LEAST:
         return []
-    return [error("plan.force", f"standing still takes {worst[0]:.2f} times the force that the motor of {worst[1]} can "
-                  f"give: at most {1.0 - LEAST:g} leave some for motion",
+    return [error("plan.force", f"standing still, or hardly moving, takes {worst[0]:.2f} times the force that the motor of "
+                  f"{worst[1]} can give: at most {1.0 - LEAST:g} leave some for motion",
                   file=source.file, lines=[int(source.moves.line[worst[2]])],
-                  hint="check masses, force and balance of [dynamics] in the machine file, and cutting_force of the set-up")]
+                  hint="check masses, force, balance and friction of [dynamics] in the machine file, and cutting_force of "
+                       "the set-up")]
 
 
 def _limits_exceeded(passes: list[PassGeometry], needed: Floats, source: Source) -> list[Diagnostic]:

@@ -54,7 +54,7 @@ def _force_speed(one: PassGeometry, forces: MotorLimits) -> Floats:
         here = np.flatnonzero(path == k)
         for row, place in enumerate(PLACES):
             at = made.derivatives(np.clip(one.begin[here] + place * travel[here], made.start, made.end))
-            used[row, here] = np.abs(forces.rows(at.q, at.dq, at.d2q)[1]).max(axis=1, initial=0.0)
+            used[row, here] = (forces.steady(at.q, at.dq, at.d2q) ** -2.0).max(axis=1, initial=0.0)
     worst = used.max(axis=0) + 0.5 * np.abs(np.diff(used, axis=0)).max(axis=0)
     with np.errstate(divide="ignore"):
         return np.asarray(np.sqrt(1.0 / worst))

@@ -7,47 +7,85 @@ from typing import Any
 
 import numpy as np
 
-from postproc.path.model import FEED
+from postproc.job.job import Job
+from postproc.path.model import FEED, JointPath
 from postproc.pipeline.result import PostResult
 from postproc.planning.planned_source import cutting_forces
-from toolpaths.arrays import distinct
+from postproc.reference.moves import Moves
+from toolpaths.arrays import Ints, distinct
 
 AT_ONCE, LOOKS = 65536, 2000
 """poses at a time; blocks at which the forces of the motors are looked at, spread over each tool's cuts"""
 
 
 def deflection(result: PostResult) -> dict[str, Any] | None:
-    """Worst move of the tip at the ends of cuts, under the force in its worst direction; None where the machine file has no
-    stiffness or no tool a force."""
+    """Worst move of the tip at the ends of cuts, under the force in its worst direction; how far drives that yield let it
+    hang differently in one tool's cuts, and move as axes reverse. None where the machine file has no stiffness, or neither a
+    tool a force nor the machine masses."""
     job, path, moves = result.job, result.path, result.moves
     if job is None or path is None or moves is None or result.machine.stiffness is None:
         return None
+    forces = cutting_forces(job)
+    found = _under_cutting(result, job, path, moves, forces) | _by_drives(result, job, path, moves)
+    return found or None
+
+
+def _cuts(path: JointPath, moves: Moves, tool: int) -> Ints:
+    return np.flatnonzero((path.code == FEED) & (moves.tool[path.move] == tool))
+
+
+def _by_drives(result: PostResult, job: Job, path: JointPath, moves: Moves) -> dict[str, Any]:
+    """`weight_um`, `reversal_um`: largest over the tools."""
+    from machines.dynamics.yielding import drive_moves
+
+    worst = dict[str, Any]()
+    for tool in np.unique(moves.tool).tolist():
+        low, high = np.full(3, np.inf), np.full(3, -np.inf)
+        rows = _cuts(path, moves, tool)
+        for first in range(0, len(rows), AT_ONCE):
+            found = drive_moves(result.machine, job.kinematics(tool), path.q[rows[first:first + AT_ONCE]])
+            if found is None:
+                return {}
+            low, high = np.minimum(low, found[0].min(axis=0)), np.maximum(high, found[0].max(axis=0))
+            worst["reversal_um"] = max(worst.get("reversal_um", 0.0), 1e3 * float(found[1].max()))
+        if len(rows):
+            worst["weight_um"] = max(worst.get("weight_um", 0.0), 1e3 * float(np.linalg.norm(high - low)))
+    return worst
+
+
+def _under_cutting(result: PostResult, job: Job, path: JointPath, moves: Moves, forces: dict[int, float]) -> dict[str, Any]:
     from machines.stiffness.along import tip_compliance
 
-    forces, worst = cutting_forces(job), dict[str, Any]()
+    worst = dict[str, Any]()
     for tool, force in forces.items():
-        rows = np.flatnonzero((path.code == FEED) & (moves.tool[path.move] == tool))
-        kinematics = job.kinematics(tool)
+        rows, kinematics = _cuts(path, moves, tool), job.kinematics(tool)
         for first in range(0, len(rows), AT_ONCE):
             here = rows[first:first + AT_ONCE]
             found = tip_compliance(result.machine, kinematics, path.q[here])
             if found is None:
-                return None
+                return {}
             bend = force * 1e3 * np.linalg.norm(found, ord=2, axis=(1, 2))
             k = int(bend.argmax())
             if bend[k] > worst.get("worst_um", -1.0):
                 worst = {"worst_um": float(bend[k]), "force_n": force, "tool": job.number_of(tool),
                          "line": int(moves.line[path.move[here[k]]]), "tip_mm": moves.tip[path.move[here[k]]].tolist()}
-    return worst or None
+    return worst
 
 
 def deflection_lines(found: dict[str, Any] | None) -> list[str]:
     """The same for people."""
     if found is None:
         return []
+    lines = []
+    if "weight_um" in found:
+        lines = [f"drives that yield: the tip hangs up to {found['weight_um']:.1f} um differently from place to place of "
+                 f"one tool's cuts, by weights, and moves up to {found['reversal_um']:.1f} um where all axes reverse, by "
+                 "friction"]
+    if "worst_um" not in found:
+        return lines
     place = ", ".join(f"{v:.3f}" for v in found["tip_mm"])
-    return [f"deflection of the tip: at most {found['worst_um']:.1f} um under {found['force_n']:g} N in the worst direction,"
-            f" T{found['tool']} at ({place}), line {found['line']}; rods, joints and drives alone, ends of cuts"]
+    return [*lines, f"deflection of the tip: at most {found['worst_um']:.1f} um under {found['force_n']:g} N in the worst "
+            f"direction, T{found['tool']} at ({place}), line {found['line']}; rods, joints and drives alone, ends of cuts"]
 
 
 def motor_load(result: PostResult) -> dict[str, Any] | None:

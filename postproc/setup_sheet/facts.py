@@ -11,6 +11,7 @@ import numpy as np
 
 from machines.machine import Machine
 from postproc.base.options import Options
+from postproc.control.modes import table_axes
 from postproc.controllers.model import ControllerFile
 from postproc.job.job import OF_SETUP, prepare
 from postproc.reference.events import cutting, spindle_states
@@ -83,6 +84,8 @@ class SheetFacts:
     """rev/min, of the machine's spindle"""
     reach: bool = False
     """no place was found without gauge lengths: the spindle would have to come down to the part itself"""
+    turning: bool = False
+    """rotary axes carry the part, so that travel, and the place that it leaves, go by how long the tools are"""
 
     @property
     def numbers(self) -> dict[str, int]:
@@ -105,12 +108,13 @@ def facts_of(toolpath: Toolpath, machine: Machine, controller: ControllerFile, o
     largest = machine.largest_spindle_speed
     output = {"feed": TRIAL_FEED, "spindle": {"rpm": min(TRIAL_SPEED, largest)}}
     trial = SetupFile.model_validate({"output": output, "tool_numbers": numbers})
-    _, found = prepare(toolpath, machine, controller, trial, options)
+    job, found = prepare(toolpath, machine, controller, trial, options)
     errors = [d for d in found if d.severity is Severity.ERROR]
     rows = np.flatnonzero(without_feed(path))
     return SheetFacts(named, tuple(_tools(path)), any(d.code == "tool.length" for d in errors), len(rows),
                       tuple(np.unique(path.line[rows])[:3].tolist()),
-                      tuple(d for d in errors if d.code not in OF_SETUP), largest)
+                      tuple(d for d in errors if d.code not in OF_SETUP), largest,
+                      turning=job is not None and len(table_axes(job.control)) > 0)
 
 
 def taken_numbers(toolpath: Toolpath) -> set[int]:

@@ -12,6 +12,7 @@ from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.base.progress import Progress
 from postproc.controllers.model import ControllerFile, load_controller
+from postproc.readback.comparison.length_margins import MUCH
 from postproc.setup.model import SetupFile
 from postproc.setup_sheet.facts import NumberedTool, SheetFacts, facts_of, named_tools, taken_numbers
 from postproc.setup_sheet.place import Fit, below_origin, beyond, fitted, found_place, looked_for
@@ -99,11 +100,11 @@ def _stated(fit: Fit, at: Callable[[tuple[float, float, float]], Fit],
 
 
 def _asked_once(ask: Callable[[Question], float | str]) -> Callable[[Question], float | str]:
-    """The same, with one answer to each question."""
+    """The same, with one answer to each question; what was left empty may be asked again."""
     said: dict[str, float | str] = {}
 
     def once(question: Question) -> float | str:
-        if question.key not in said:
+        if said.get(question.key, "") == "":
             said[question.key] = ask(question)
         return said[question.key]
 
@@ -131,6 +132,7 @@ def _made(toolpath: Toolpath, machine: Machine, controller: str | Path, options:
         return SetupSheet("", (*known, *facts.refused), facts)
     questions = [*asked, *questions_of(facts)]
     answers, left = answered(questions[len(asked):], given, ask, assume)
+    questions = [one for one in questions if ask is not None or not one.optional]
     left = [*unnumbered, *left]
     known += _unused(given, facts, toolpath)
     for tool in () if facts.lengths or reach else facts.tools:  # not needed, but given: travel is checked with it
@@ -245,10 +247,20 @@ def _assumed(made: SetupSheet, fit: Fit) -> list[Diagnostic]:
             for key in fit.setup.assumed if key in keys]
     if ORIGIN in fit.setup.assumed:
         said.append(_place_assumed(fit))
+    said += _no_length(values, fit)
     if numbers:
         said.append(warning("setup.assumed", f"{TOOL_NUMBERS}: {numbers} is assumed: nobody has stated it", hint="see that "
                             "the magazine holds them so, or put in its numbers, and take `tool_numbers` out of `assumed`"))
     return said
+
+
+def _no_length(values: dict[str, Answer], fit: Fit) -> list[Diagnostic]:
+    """Tools whose length nobody has stated, which may not be much longer than the 0 mm that the program is proved with."""
+    lengths = fit.result.comparison.lengths if fit.result.comparison is not None else ()
+    return [warning("setup.assumed", f"tools.{one.number}.gauge_length = 0 mm is assumed: nobody has stated it, and by "
+                    f"{one.longer:.0f} mm more the program meets {one.ends_longer}", hint=f"state it by --gauge-length "
+                    f"{one.number}=MM, or in the file")
+            for one in lengths if one.longer < MUCH and f"tools.{one.number}.gauge_length" not in values]
 
 
 def _place_assumed(fit: Fit) -> Diagnostic:

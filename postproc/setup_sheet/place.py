@@ -151,13 +151,16 @@ def found_place(result: PostResult, toolpath: Toolpath) -> list[Diagnostic]:
     options = replace(result.options, error_model="", orient="keep")
     place = next(_places(toolpath, result.machine, setup, options, attitudes, lacks), None)
     if place is None:
+        reached = any(one.unreachable == 0.0 for one in attitudes)
+        other = "a machine with more travel" if reached else "a machine whose rotary axes reach them"
         return [_note("no place of the part was found that travel allows" + "".join(f"; {why}" for why in lacks[:3]),
-                      "a machine with more travel, or a file for each side of the part")]
+                      f"{other}, or a file for each side of the part")]
     p = place.part
     origin, x, y = ([round(v, 9) for v in vector] for vector in (p.origin, p.x_axis, p.y_axis))
-    return [_note(f"travel allows another place: {place.why}",
-                  f"[part] origin = {origin}, x_axis = {x}, y_axis = {y} in the set-up; postproc place finds the fastest "
-                  "near it, postproc setup new writes and proves it")]
+    turns = any(result.machine.rotary)
+    then = "postproc place finds the fastest near it, " if turns else "clamp it so and set the work offset there: "
+    return [_note(f"travel allows another place: {place.why}", f"[part] origin = {origin}, x_axis = {x}, y_axis = {y} "
+                  f"in the set-up; {then}postproc setup new writes and proves it")]
 
 
 def _largest(machine: Machine) -> float:

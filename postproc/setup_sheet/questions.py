@@ -44,6 +44,7 @@ class Question:
         default: taken where the answer is empty, None where there is none
         assumed: what --yes takes, None: nothing, the key is left out
         largest: what is taken at most, where the machine says
+        optional: nothing depends on it, an empty answer leaves the key out
     """
 
     kind: QuestionKind
@@ -53,6 +54,7 @@ class Question:
     assumed: float | str | None
     name: str = ""
     largest: float = math.inf
+    optional: bool = False
 
     @property
     def key(self) -> str:
@@ -77,8 +79,8 @@ class Question:
 
     def prompt(self) -> str:
         """What stands before the answer."""
-        default = "" if self.default is None else f" [{self.default:g}]" if isinstance(self.default, float) else (
-            f" [{self.default}]")
+        offered = f"{self.default:g}" if isinstance(self.default, float) else self.default
+        default = "" if offered is None or self.optional else f" [{offered}]"
         return f"{self.text}{f', {self.unit}' if self.unit else ''}{default}: "
 
 
@@ -122,7 +124,8 @@ def number_questions(named: tuple[NumberedTool, ...]) -> list[Question]:
 
 def origin_question(found: tuple[float, float, float]) -> Question:
     """Where the part stands on a table that turns; offered is the place that travel has chosen."""
-    return Question("origin", 0, "origin of the CL file in the table frame: x, y, z (offered: a place that travel allows)",
+    return Question("origin", 0, "where the origin of the CL file stands in machine coordinates, axes at 0: x, y, z "
+                    "(offered: a place that travel allows)",
                     ", ".join(f"{v:g}" for v in found), None)
 
 
@@ -138,6 +141,9 @@ def questions_of(facts: SheetFacts) -> list[Question]:
         if facts.lengths or facts.reach:
             result.append(Question("gauge_length", tool.number, f"{tool.called}: gauge length, from the gauge point of the "
                                    "spindle to the tip", None, _length(tool)))
+        elif facts.turning:
+            result.append(Question("gauge_length", tool.number, f"{tool.called}: gauge length (empty: not known; travel and "
+                                   "place are then found as if it were 0)", "", None, optional=True))
         if not tool.speed:
             most = "" if math.isinf(facts.largest_speed) else f", at most {facts.largest_speed:g}"
             result.append(Question("spindle", tool.number, f"{tool.called}: spindle speed, {tool.direction}{most}", None,
@@ -165,6 +171,8 @@ def parsed(question: Question, text: str) -> tuple[float | str | None, str]:
         return (text.lower(), "") if text.lower() in known else (None, f"{text!r} is not one of {', '.join(known)}")
     if question.kind == "origin":
         return (text, "") if three_numbers(text) else (None, f"{text!r} is not x, y, z in mm")
+    text = text.removesuffix(_UNITS[question.kind]).rstrip() if _UNITS[question.kind] else text
+    text = text.removesuffix("rpm").rstrip() if question.kind == "spindle" else text
     if _thousands(text):
         return None, f"{text!r} may be {text.replace(',', '')} or {text.replace(',', '.')}: write it without the comma"
     try:
@@ -204,8 +212,8 @@ def answered(questions: list[Question], given: GivenAnswers, ask: Callable[[Ques
             result[question.key] = Answer(value, "answered")
         elif assume and question.assumed is not None:
             result[question.key] = Answer(question.assumed, "assumed")
-        elif ask is not None:
-            result[question.key] = Answer(ask(question), "answered")
-        else:
+        elif ask is not None and (value := ask(question)) != "":
+            result[question.key] = Answer(value, "answered")
+        elif not question.optional:
             left.append(question)
     return result, left

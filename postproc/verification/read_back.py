@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from postproc.base.header_words import HEADER, NO_FILE, ProgramHeader, read_header, same_name
-from postproc.base.memory import give_back
 from postproc.base.options import Options
 from postproc.base.progress import Progress
 from postproc.control.control import Control
@@ -90,7 +89,6 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     `others`: files of its subprograms, by the names that the program calls them by; `of_cl`: the lines of the CL file that a
     line of the program is written from, where that is known; `margins`: by how much tools may differ is looked for too.
     """
-    give_back(len(job.moves))
     machine, control = job.machine, job.control
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
     reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls,
@@ -107,7 +105,6 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
         return None, diagnostics
     offsets = _offsets(job, reader, home)
     motion, found = run(code, machine.axis_names, offsets, gcode)
-    give_back(len(motion))
     faults = Faults(job.toolpath.file, gcode)
     unseen, whole = check_start(code, job, faults), code
     code = code.without((*machine.axis_names, *(a.lower() for a in machine.axis_names), *"IJKijk"))

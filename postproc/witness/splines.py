@@ -18,6 +18,8 @@ _PO = re.compile(rb"PO\s*\[\s*([XYZ])\s*\]\s*=\s*\(([^()]*)\)|\b([XYZ])\s*=\s*PO
 _PL = re.compile(rb"\bPL\s*=\s*([\d.]+)")
 _SPL = re.compile(rb"K([123])([XYZ])\s*([-+]?[\d.]+(?:\s?E[-+]?\d+)?)")
 _INCH, _MM = re.compile(rb"\bG700?(?!\d)|BEGIN PGM[^\n]*INCH"), re.compile(rb"\bG710?(?!\d)|BEGIN PGM[^\n]*MM")
+_WORD = re.compile(rb"(?<![A-Z\[(=])([XYZ])\s*=?\s*([-+]?(?:\d+\.?\d*|\.\d+))")
+_ENDS = re.compile(rb"(?<![A-Z])G0?[0-3](?![\d.])|\bPOLY\b")
 ROUNDED = 2e-4
 """mm that words and coefficients of a polynomial may be rounded by"""
 
@@ -97,13 +99,15 @@ def check_curves(case: Case, executed: ExecutedBlocks) -> tuple[list[Finding], i
     """Polynomials of the text (POLY of SINUMERIK, SPL of a TNC) that the blocks executed for them do not follow; how many
     were compared. Both start and end where the blocks do, so that what is compared is how they bow between."""
     text = _REMARK.sub(b"", case.program.upper())
-    if (b"PO" not in text and b"SPL" not in text) or (np.diff(executed.line) < 0).any():
+    if (b"PO" not in text and b"SPL" not in text and b"BSPLINE" not in text) or (np.diff(executed.line) < 0).any():
         return [], 0
     inch = _INCH.search(text) is not None
     if inch and _MM.search(text):
         return [], 0
-    columns, worst, count = [executed.letters.index(a) for a in "XYZ" if a in executed.letters], (0.0, 0), 0
-    for number, block in enumerate(text.split(b"\n"), 1):
+    columns = [executed.letters.index(a) for a in "XYZ" if a in executed.letters]
+    blocks, scale = text.split(b"\n"), 25.4 if inch else 1.0
+    worst, count = _off_polygons(blocks, executed, columns, scale) if len(columns) == 3 else ((0.0, 0), 0)
+    for number, block in enumerate(blocks, 1):
         bow = _bow(block) if b"PO" in block or b"SPL" in block else None
         first, last = np.searchsorted(executed.line, [number, number + 1])
         if bow is None or last <= first or len(columns) < 3:
@@ -111,12 +115,51 @@ def check_curves(case: Case, executed: ExecutedBlocks) -> tuple[list[Finding], i
         places = np.cumsum(executed.steps(np.arange(first, last))[:, columns], axis=0)
         p = np.arange(1.0, last - first + 1.0)[:, None] / (last - first)
         powers = sum(term * (p ** n - p) for n, term in enumerate(bow, 2))
-        off = np.abs(places - places[-1] * p - powers * (25.4 if inch else 1.0)).max()
+        off = np.abs(places - places[-1] * p - powers * scale).max()
         worst, count = max(worst, (float(off), number)), count + 1
     if worst[0] <= ROUNDED:
         return [], count
-    said = f"the blocks of a polynomial are {worst[0]:.4f} mm off what its coefficients say"
+    said = f"the blocks of a polynomial are {worst[0]:.4f} mm off what its numbers say"
     return [Finding("path", said, 0, worst[1])], count
+
+
+def _off_polygons(blocks: list[bytes], executed: ExecutedBlocks, columns: list[int],
+                  scale: float) -> tuple[tuple[float, int], int]:
+    """((mm by which blocks executed for a BSPLINE are off the curve of its control points at most, its line), how many were
+    compared). A cubic with equal knots, tangential to the polygon at both ends, from where the block before it has ended;
+    the next G0 to G3 or POLY ends it."""
+    worst, count, held = (0.0, 0), 0, list[tuple[int, dict[bytes, float]]]()
+    here, inside = dict[bytes, float](), False
+    for number, block in enumerate([*blocks, b"G0"], 1):
+        ends = _ENDS.search(block) is not None
+        if inside and ends and held:
+            first, last = np.searchsorted(executed.line, [held[0][0], held[-1][0] + 1])
+            travel = executed.steps(np.arange(first, last))[:, columns]
+            off = _off_polygon(np.array([[at[a] for a in (b"X", b"Y", b"Z")] for _, at in held]) * scale, travel)
+            worst, count = max(worst, (off, held[0][0])), count + 1
+        inside = (inside or b"BSPLINE" in block) and not ends
+        words = {m[1]: float(m[2]) for m in _WORD.finditer(block)}
+        here |= words
+        if b"BSPLINE" in block:
+            held = []
+        if inside and words:
+            held.append((number, dict(here)))
+    return worst, count
+
+
+def _off_polygon(points: Array, travel: Array) -> float:
+    """mm of executed blocks by their travel (N, 3), as many for each piece, from the curve whose control points behind the
+    first one (n, 3) are given; infinite where they are no such curve."""
+    places = np.cumsum(travel, axis=0)
+    pieces = len(points) + 1 - 3
+    if pieces < 1 or not len(places):
+        return float("inf")
+    control = np.concatenate([points[-1:] - places[-1], points])
+    knots = np.concatenate([np.zeros(4), np.arange(1.0, pieces), np.full(4, float(pieces))])
+    at = np.arange(1.0, len(places) + 1.0) * (pieces / len(places))
+    said = np.concatenate([_basis(knots, some, len(control)) @ control
+                           for some in np.array_split(at, max(len(at) * len(control) // 2**20, 1))])
+    return float(np.abs(places - (said - control[0])).max())
 
 
 def _bow(block: bytes) -> Array | None:

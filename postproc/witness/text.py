@@ -102,7 +102,7 @@ def read(data: bytes) -> ClText:
     raw = np.frombuffer(text, np.uint8)
     ends = np.flatnonzero((raw == 10) | (raw == JOIN[0]))
     kept = list(zip([0, *(last + 1 for _, last in spans)], [*(first for first, _ in spans), len(text)], strict=True))
-    lengths = [text.count(b"\n", *part) for part in kept]
+    lengths = np.diff(np.searchsorted(np.flatnonzero(raw == 10), np.array(kept)), axis=1)[:, 0].tolist()
     rest = text[kept[-1][0]:]
     lengths[-1] += bool(rest.strip()) and not rest.endswith(b"\n")
     before = np.cumsum(lengths)

@@ -25,13 +25,18 @@ class SiemensWriter(IsoWriter):
         return super().smoothed(mm, blocks)
 
     def cubic(self, block: int) -> str:
-        """POLY PO[X]=(end,a2,a3) ...: the parameter goes from 0 to 1, as without PL."""
+        """POLY PO[X]=(end,a2,a3) ...: the parameter goes from 0 to 1, as without PL; BSPLINE X Y Z PL=1: a control point."""
         p, rules, words = self.program, self.controller, list[str]()
+        spline = p.spline[block] >= 0
         if self.mode != PER_MINUTE:
             words.append(rules.codes.per_minute)
             self.mode, self.feed = PER_MINUTE, ""
-        words += ["POLY"] if self.motion != "POLY" else []
-        self.motion = "POLY"
+        word = rules.splines.control_points if spline else rules.splines.word
+        words += [word] if self.motion != word else []
+        self.motion = word
+        if spline:
+            return " ".join([*words, self.axis_words(block, block + 1)[0].strip(), rules.splines.interval]) + (
+                self.feeds(block, block + 1)[0])
         for letter, terms in zip("XYZ", p.curves[p.curve[block]] / rules.unit, strict=True):
             column = p.letters.index(letter)
             if p.write[block, column]:

@@ -93,7 +93,8 @@ class WriterState:
         taps = any(hole.key.startswith("TAP") for hole in p.holes)
         falling = any(len(set(self.cycles[hole.cycle].steps)) > 1 for hole in p.holes)
         others = ((rules.program.smoothing_option, True), (rules.arcs.helical_option, bool(rising.any())),
-                  (rules.cycles.rigid_option, taps), (rules.cycles.falling_relies_on, falling))
+                  (rules.cycles.rigid_option, taps), (rules.cycles.falling_relies_on, falling),
+                  (rules.splines.relies_on, bool((p.spline >= 0).any())))
         return needed + [text for text, used in others if text and used]
 
     def restate(self) -> None:

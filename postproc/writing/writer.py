@@ -179,7 +179,7 @@ class Writer(WriterState, ABC):
         """Blocks between preamble and ending: stretches of plain motion at once, all else one by one."""
         p = self.program
         switch = np.flatnonzero(np.diff(p.skip)) + 1
-        curves = set(np.flatnonzero(p.curve >= 0).tolist())
+        curves = set(np.flatnonzero((p.curve >= 0) | (p.spline >= 0)).tolist())
         stops = sorted({*p.commands, *(h.first for h in p.holes), *(h.last + 1 for h in p.holes), *switch.tolist(), *curves,
                         len(p)})
         holes = {h.first: h for h in p.holes}

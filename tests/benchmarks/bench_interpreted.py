@@ -24,6 +24,9 @@ import machines
 from machines.geometric_error.actual import actual_chain_loop, rods
 from machines.geometric_error.actual.actual_chain_loop import ActualChainLoop
 from machines.geometric_error.actual.actual_serial import ActualSerial
+from machines.geometric_error.tables import curve_banks
+from machines.geometric_error.tables.curve_banks import banks
+from machines.geometric_error.tables.curves import TableCurve
 from machines.kinematics import chain_loop
 from postproc.collision import search
 from postproc.collision.solid import solid
@@ -115,6 +118,10 @@ def main() -> None:
         interpreted = seconds(lambda: chain.poses(q, None, actual.errors, np.array(actual.tool)))
     print(f"actual_chain_loop.py, 300 poses: {1e3 * columns:.3f} ms, interpreted {1e3 * interpreted:.1f} ms, "
           f"{interpreted / columns:.0f} times")
+    row = np.linspace(0.0, 400.0, 21)
+    (_, bank), = banks([TableCurve(row, rng.normal(size=42), both=True) for _ in range(6)])
+    at, course = rng.uniform(0.0, 400.0, 300), np.ones(300)
+    compared("curve_banks.py, 300 positions", curve_banks, lambda: bank.at(at, course), lambda: bank.at(at, course))
     moving, pieces = random_case(rng)
     body = solid(trimesh.creation.icosphere(2, radius=12.0), HERE)
     compared(f"search.py, {len(moving)} moves", search, lambda: search.nearest(body, moving, pieces, 2.0),

@@ -89,6 +89,8 @@ MACHINE = [
         "velocity = 500\ncutting_velocity = 600\n",
         ("cutting_velocity = 600", "cutting_velocity = 500"),
     ),
+    HintCase("machine.dynamics", CHECK, {"m.toml": 'base = "linuxcnc-pentapod"\n[dynamics.axes.X]\nmass = 3\n'},
+             "take .dynamics. out", (Edit("m.toml", "[dynamics.axes.X]\nmass = 3\n", ""),)),
     HintCase("machine.dynamics", CHECK, {"m.toml": 'base = "mill-3axis"\n[dynamics.axes.Q]\nmass = 3\n'},
              "its axes are X, Y, (Z)", (Edit("m.toml", "axes.Q", r"axes.\1"),)),
     HintCase("machine.dynamics", CHECK, {"m.toml": 'base = "mill-3axis"\n[dynamics]\ndown = [0, 0, -2]\n'},

@@ -158,7 +158,7 @@ _TOOLS = [
     convert(
         "plan.force",
         START + CUT,
-        "check masses, (force) and balance",
+        "check masses, (force), balance and friction",
         Edit("m.toml", "force = 300", r"\1 = 3000"),
         m=WEAK,
         more=" --feed planned",

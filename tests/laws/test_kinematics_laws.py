@@ -178,3 +178,16 @@ def test_home_lies_inside_the_travel_and_is_a_pose(name):
     m = law.machine(name)
     assert np.all((m.home >= m.limits.lower) & (m.home <= m.limits.upper))
     assert np.isfinite(np.hstack(m.kinematics.forward(m.home[None]))).all()
+
+
+def test_joints_outside_the_loops_take_the_pose_along_in_its_mode(name):
+    """However far they go at once: what is followed from block to block takes no steps for them."""
+    m = law.machine(name)
+    outside = ~np.array(m.kinematics.in_loops)
+    if m.kinematics.transmits is None or not outside.any():
+        return
+    q, tip, axis = law.poses(m, 20, seed=7)
+    far = q + outside * np.where(m.rotary, 2.0, 300.0) * np.random.default_rng(7).uniform(-1.0, 1.0, q.shape)
+    pose = m.kinematics.carried(np.hstack([tip, axis]), q, far)
+    assert np.abs(pose[:, :3] - tip).max() > 20.0
+    np.testing.assert_allclose(np.hstack(m.kinematics.forward(far, near=pose)), pose, rtol=0.0, atol=1e-7)

@@ -75,15 +75,16 @@ def zigzag(folder: Path, controller: str | Path, machine: str | Path = DELTA) ->
 
 
 def test_lineardeltakins_at_the_points_of_a_posted_program(standstill) -> None:
-    """Cartesian words of pocket.cls: LinuxCNC's joints at rest there are ours, within 1e-6 mm."""
+    """Cartesian words of pocket.cls, and places all about its home: LinuxCNC's joints at rest there are ours, within 1e-6 mm."""
     result = converted("pocket.cls", DELTA, "tools")
     assert result.job is not None and "tool-centre-point control" in result.text
     machine, motion = result.machine, outputs.read(result)[1]
     gauge = np.unique(motion.end[(motion.register >= 0) & (motion.code > 0)], axis=0)
     assert len(gauge) > 30
-    gauge = gauge[::3]
+    tip = machine.kinematics.forward(machine.home[None])[0] + np.random.default_rng(3).uniform(-40, 40, (20, 3))
+    gauge = np.concatenate([gauge[::6], np.pad(tip, ((0, 0), (0, gauge.shape[1] - 3)))])
     theirs = standstill(machine, gauge)
-    ours = machine.kinematics.inverse(gauge, np.tile([0.0, 0.0, 1.0], (len(gauge), 1)))[0]
+    ours = machine.kinematics.inverse(gauge[:, :3], np.tile([0.0, 0.0, 1.0], (len(gauge), 1)))[0]
     assert np.abs(theirs - ours).max() < TIGHT
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import machines
 from machines.machine import Machine
-from tests.linuxcnc import config, simulator
+from tests.linuxcnc import simulator
 from tests.linuxcnc.simulator import Run
 from toolpaths.arrays import Floats
 
@@ -48,19 +48,6 @@ def test_joints_at_standstill_are_our_inverse(standstill, name: str, tool_length
     best = np.nanmin(turns.max(axis=2), axis=0)
     assert best.max() < TIGHT
     np.testing.assert_allclose(joints[:, 3:], poses[:, 3:], rtol=0, atol=TIGHT)
-
-
-def test_delta_joints_at_standstill_are_our_inverse(standstill) -> None:
-    if "linuxcnc-lineardelta" not in machines.names():
-        pytest.skip("no machine linuxcnc-lineardelta")
-    machine = machines.load("linuxcnc-lineardelta")
-    home = machine.kinematics.forward(machine.home[None])[0][0]
-    tip = home + np.random.default_rng(3).uniform(-40, 40, (20, 3))
-    poses = np.hstack([tip, np.zeros((len(tip), len(config.letters(machine)) - 3))])
-    joints = standstill(machine, poses)[:, :3]
-    axis = np.tile([0.0, 0.0, 1.0], (len(tip), 1))
-    branches = machine.kinematics.inverse(tip, axis)[:, :, :3]
-    assert np.nanmin(np.abs(branches - joints).max(axis=2), axis=0).max() < TIGHT
 
 
 def test_straight_move_takes_length_over_feed_and_one_ramp(recorded, tmp_path: Path) -> None:

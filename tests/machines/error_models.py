@@ -15,6 +15,7 @@ from machines.geometric_error.files.covariance import angular
 from machines.geometric_error.tables.curves import Fourier, Polynomial, TableCurve
 from machines.geometric_error.tables.names import DIRECTIONS, parse
 from machines.kinematics.base import Kinematics
+from machines.kinematics.legs.in_series import LegsInSeries
 from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.serial import Serial
 from tests.machines.random_slides import random_slides
@@ -34,7 +35,7 @@ def serial_errors(kinematics: Kinematics, seed: int = 0, length: float = 0.01, a
     for letter, rotary in zip(kinematics.axis_names, kinematics.rotary, strict=True):
         for k, direction in enumerate(DIRECTIONS):
             size = angle if k >= 3 else length
-            components.append(Component(parse(f"E{direction}{letter}"), _curve(rng, rotary, k, size)))
+            components.append(Component(parse(f"E{direction}{letter}"), curve(rng, rotary, k, size)))
             if effect(parse(f"E{direction}0{letter}"), kinematics):
                 constants[f"E{direction}0{letter}"] = float(rng.normal() * size)
     for k, direction in enumerate(DIRECTIONS[:5]):
@@ -43,7 +44,7 @@ def serial_errors(kinematics: Kinematics, seed: int = 0, length: float = 0.01, a
     return SerialErrors(tuple(components), constants, reference, {moving: "moving"})
 
 
-def _curve(rng: np.random.Generator, rotary: bool, k: int, size: float) -> TableCurve | Fourier | Polynomial:
+def curve(rng: np.random.Generator, rotary: bool, k: int, size: float) -> TableCurve | Fourier | Polynomial:
     if rotary:
         return Fourier(rng.normal(size=7) * size / 2.0)
     if k == 1:
@@ -72,7 +73,7 @@ def model(kinematics: Kinematics, seed: int = 0) -> ErrorModel:
     rng, chain = np.random.default_rng(seed), SerialErrors(constants={"EA0S": 4.0 * ARCSEC, "EX0S": 0.02})
     if any(kinematics.rotary) and not isinstance(kinematics, OnLegs):
         letter = kinematics.axis_names[-1]
-        parts = tuple(Component(parse(f"E{d}{letter}"), _curve(rng, True, k, 3.0 * ARCSEC if k >= 3 else 0.01))
+        parts = tuple(Component(parse(f"E{d}{letter}"), curve(rng, True, k, 3.0 * ARCSEC if k >= 3 else 0.01))
                       for k, d in enumerate(DIRECTIONS))
         chain = SerialErrors(parts, {**chain.constants, f"EX0{letter}": 0.02, f"EA0{letter}": 5.0 * ARCSEC})
     return ErrorModel(chain, rod_errors(kinematics, seed))
@@ -90,6 +91,9 @@ def joints(kinematics: Kinematics, n: int, seed: int = 0) -> Floats:
         box = kinematics.workspace
         places = rng.uniform([*box.lower, box.tilt[0]], [*box.upper, box.tilt[1]], (n, 4))
         return kinematics.joints_at(places, np.zeros((n, 0)))
+    if isinstance(kinematics, LegsInSeries):
+        places = rng.uniform([*kinematics.workspace.lower, 0.0], [*kinematics.workspace.upper, 0.0], (n, 4))
+        return kinematics.joints_at(places, rng.uniform(-1.0, 1.0, (n, len(kinematics.turning))))
     slides = random_slides(kinematics, rng, n)
     return slides if not any(kinematics.rotary) else np.column_stack([slides, rng.uniform(-1.0, 1.0, n)])
 

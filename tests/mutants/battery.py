@@ -409,6 +409,7 @@ CASES: dict[str, Case] = {
     "fast planned": Case(FAST, "mikron-ucp710", "linuxcnc", options={"feed": "planned"}),
     "round planned": Case(ROUND, "mikron-ucp710", "linuxcnc", options={"feed": "planned"}),
     "plane spline": Case(CURVE, "mill-3axis", "linuxcnc", TURNED),
+    "points siemens": Case(CURVE, str(Path(__file__).with_name("curves_by_points.toml")), SIX["siemens"], TURNED),
     **{f"curves {name}": Case(CURVE, str(Path(__file__).with_name("curves_bought.toml")), SIX[name], TURNED)
        for name in ("siemens", "heidenhain")},
     "loose": Case(FIVE, "mikron-ucp710", "linuxcnc", options={"tolerance": 0.5}),

@@ -56,7 +56,7 @@ FAULTS = (
     Fault("second and third coefficient exchanged", "writer of siemens", "SiemensWriter.cubic",
           "self.number_text(terms, rules.splines.decimals)", "self.number_text(terms[::-1], rules.splines.decimals)",
           ("curves siemens",)),
-    Fault("POLY not stated", "writer of siemens", "SiemensWriter.cubic", 'words += ["POLY"]', 'words += ["G1"]',
+    Fault("POLY not stated", "writer of siemens", "SiemensWriter.cubic", 'words += [word]', 'words += ["G1"]',
           ("curves siemens",)),
     Fault("K3 with the sign of a parameter from 0 to 1", "writer of heidenhain", "KlartextWriter.cubic",
           "(-third, second + 3.0 * third)", "(third, second + 3.0 * third)", ("curves heidenhain",)),

@@ -22,7 +22,7 @@ SEED = 19
 PROGRAMS = (*(f"{kind} {c}" for c in SIX for kind in (
     "flat", "laws", "axes", "helix", "five", "faces", "rests", "side", "spline", "inches", "again", "homing")),
             *(f"{kind} {c}" for c in ("fanuc", "siemens", "heidenhain", "haas") for kind in ("cycles", "tip")),
-            "curves siemens", "curves heidenhain")
+            "curves siemens", "curves heidenhain", "points siemens")
 EACH = 26
 """changes of each program"""
 SAME = {"same": "the same motion, states and times", "near": "ends within the tolerance, the rest the same",

@@ -23,6 +23,7 @@ WITNESS = "postproc/witness/assign_blocks.py"
 """shares no code with the rest, not even this"""
 AT_ONCE = {
     "machines/geometric_error/actual/actual_chain_loop.py", "machines/geometric_error/actual/rods.py",
+    "machines/geometric_error/tables/curve_banks.py",
     "machines/kinematics/chain_loop.py", "postproc/collision/search.py",
     "postproc/feedrate/interior_packed.py", "postproc/feedrate/paths.py", "postproc/feedrate/tightening.py",
     "postproc/path/coarse_bound.py", "postproc/readback/execution/frames_loop.py", "postproc/readback/text/word_loop.py",
@@ -31,7 +32,8 @@ AT_ONCE = {
 """Small inputs are done by numpy or scipy, all points at once, and nobody is to wait for a compiler over a
 small file. The loops interpreted take, of the same small inputs (`python tests/benchmarks/bench_interpreted.py`): rods.py
 51 times as long (300 poses: 93 ms for 1.8), chain_loop.py 78 times (300 poses: 4 ms for 0.05; 300 tips: 33 times),
-actual_chain_loop.py 49 times (43 ms for 0.9), frames_loop.py 46 times (300 points: 0.9 ms for 0.02), search.py 15 times
+actual_chain_loop.py 39 times (25 ms for 0.65), curve_banks.py 41 times (300 positions), frames_loop.py 46 times (300 points:
+0.9 ms for 0.02), search.py 15 times
 (5 moves: 2.7 s for 0.18), interior_packed.py 45 to 68 times (256 knots: 0.6 s for 0.013), paths.py 118 to 130 times,
 tightening.py 23 to 31 times, sweep.py 35 times; goto_loop.py, word_loop.py and block_text.py go
 through characters one by one, some hundred times; coarse_bound.py is asked of long curves alone. `numeric` tests compare

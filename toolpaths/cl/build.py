@@ -13,7 +13,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from toolpaths.arrays import Floats
-from toolpaths.choices import LengthUnit
+from toolpaths.choices import CubicPieces, LengthUnit
 from toolpaths.cl.arcs import ArcTable
 from toolpaths.cl.text.dialects import SCALE, Dialect
 from toolpaths.cl.text.log import DiagnosticLog
@@ -93,7 +93,7 @@ class ToolpathBuilder:
     """Reads one program. Handlers get it with the statement and use what they need."""
 
     def __init__(self, program: StatementList, points: Points, dialect: Dialect, units: LengthUnit, log: DiagnosticLog,
-                 allow_unknown: Iterable[str] = (), spline_slack: float = 0.0, cubics: bool = False,
+                 allow_unknown: Iterable[str] = (), spline_slack: float = 0.0, cubics: CubicPieces = "",
                  passive: frozenset[str] = frozenset()):
         self.program, self.points, self.dialect, self.log = program, points, dialect, log
         self.units, self.scale, self.spline_slack, self.cubics = units, SCALE[units], spline_slack, cubics
@@ -173,6 +173,8 @@ class ToolpathBuilder:
         self.shift: Floats = np.zeros(3)
         self.toward: Triple | None = None
         self.splines = 0
+        self.uniform_end = -1
+        """rows when a spline with equal knots had ended"""
         self.contacts: list[int] = []
         self.axis_system: list[list[float]] | None = None
         self.name = ""

@@ -12,14 +12,17 @@ from toolpaths.cl.biarcs import DENSER, FLAT, biarcs, plane_of
 from toolpaths.cl.build import ToolpathBuilder, Triple
 from toolpaths.cl.spline_chords import (
     DEGREE,
+    chord_places,
     cubic_points,
     de_boor,
     knots_of,
+    part_behind,
     places_of,
     spline_points,
     width_of,
 )
 from toolpaths.cl.text.statements import COMMENT, TEXT, Statement, Word, words_of
+from toolpaths.cl.uniform_splines import FIT, equal_knots, uniform_spline
 from toolpaths.toolpath import Role
 
 SPLINE_CHORD = 0.001
@@ -187,7 +190,7 @@ def nurbs(b: ToolpathBuilder, s: Statement) -> None:
     curve = np.array([start, *control])
     chord = b.spline_slack / b.scale
     b.splines += 1
-    if b.cubics and _add_cubics(b, curve, inner, chord):
+    if b.cubics == "pieces" and _add_pieces(b, curve, inner, chord):
         return
     chords = spline_points(curve, inner, chord)
     if not len(chords):
@@ -196,6 +199,8 @@ def nurbs(b: ToolpathBuilder, s: Statement) -> None:
         return
     arcs = spline_arcs(curve, inner, chord, b.splines - 1)
     pieces = arcs if 0 < len(arcs) < len(chords) else [(x, y, z, ()) for x, y, z in chords.tolist()]
+    if b.cubics == "uniform" and _add_uniform(b, curve, inner, chord, len(pieces)):
+        return
     for n, (x, y, z, arc) in enumerate(pieces, 1):
         if arc:
             b.arcs.toward[len(b.arcs.row)] = arc[7:]
@@ -205,16 +210,45 @@ def nurbs(b: ToolpathBuilder, s: Statement) -> None:
     b.add_point(control[-1])
 
 
-def _add_cubics(b: ToolpathBuilder, curve: Floats, inner: Floats, chord: float) -> bool:
+def _add_pieces(b: ToolpathBuilder, curve: Floats, inner: Floats, chord: float) -> bool:
+    """The spline piece by piece, or within the tolerance as one of fewer pieces; False where neither goes."""
+    count = len(np.unique(inner))
+    fewer = uniform_spline(curve, inner, FIT * chord, count + DEGREE - 1) if count > 1 else curve[:0]
+    if len(fewer) and _add_cubics(b, fewer, equal_knots(len(fewer) - DEGREE), (1.0 - FIT) * chord):
+        return True
+    return _add_cubics(b, curve, inner, chord)
+
+
+def _add_uniform(b: ToolpathBuilder, curve: Floats, inner: Floats, chord: float, most: int) -> bool:
+    """The spline as a cubic with equal knots, of fewer than `most` control points behind the first; behind another one its
+    first chord stands between them, so that the control takes them for two. False where that does not go."""
+    begin: Floats | None = None
+    if b.uniform_end == b.row:
+        at = chord_places(curve, inner, chord)
+        if len(at) < 3:
+            return False
+        curve, inner = part_behind(curve, inner, float(at[1]))
+        begin = curve[0]
+    found = uniform_spline(curve, inner, FIT * chord, most - (begin is not None))
+    if not len(found) or not _add_cubics(b, found, equal_knots(len(found) - DEGREE), (1.0 - FIT) * chord, begin):
+        return False
+    b.uniform_end = b.row
+    return True
+
+
+def _add_cubics(b: ToolpathBuilder, curve: Floats, inner: Floats, chord: float, begin: Floats | None = None) -> bool:
     """The spline piece by piece, each by chords at equal steps of its parameter, as many as a power of two; False, and
-    nothing is added, where it turns back between two knots: there steps of its parameter stand nearly still."""
-    points, last = cubic_points(curve, inner, chord)
+    nothing is added, where it turns back between two knots: there steps of its parameter stand nearly still. `begin`
+    (3,): a point before it."""
+    points, last = cubic_points(curve, inner, chord, b.cubics == "uniform")
     if not len(points):
         return False
     along = np.diff(points, axis=0, prepend=curve[:1])
     turn = np.arctan2(np.linalg.norm(np.cross(along[:-1], along[1:]), axis=1), (along[:-1] * along[1:]).sum(axis=1))
     if (turn[~last[:-1]] > _TURNS).any():
         return False
+    if begin is not None:
+        b.add_point((float(begin[0]), float(begin[1]), float(begin[2])), role=Role.SPLINE)
     for point, ends in zip(points[:-1].tolist(), last[:-1].tolist(), strict=True):
         b.add_point((point[0], point[1], point[2]), role=Role.SPLINE if ends else Role.CUBIC)
     x, y, z = curve[-1].tolist()

@@ -261,7 +261,7 @@ def _numbers_fault(s: Statement, form: RecordForm) -> str:
     if s.major == "TLDATA" and s.words[:1] == ("MILL",):
         counts = _MILL_COUNTS
     if s.major in _VALUED_IN:
-        bare = [w for w, after in zip(s.words, (*s.words[1:], ""), strict=True) if w in _VALUED and isinstance(after, str)]
+        bare = [w for w, after in zip(s.words, (*s.words, "")[1:], strict=True) if w in _VALUED and isinstance(after, str)]
         if bare:
             return f"no number behind {bare[0]}"
     if s.has(*_ANY_NUMBERS.get(s.major, ())):

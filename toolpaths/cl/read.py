@@ -7,7 +7,7 @@ from dataclasses import field, replace
 from difflib import get_close_matches
 from pathlib import Path
 
-from toolpaths.choices import DialectName, LengthUnit, ShopName
+from toolpaths.choices import CubicPieces, DialectName, LengthUnit, ShopName
 from toolpaths.cl.assemble import assemble
 from toolpaths.cl.build import ToolpathBuilder
 from toolpaths.cl.curves import SPLINE_CHORD, SPLINE_SHARE
@@ -73,7 +73,7 @@ def read_file(path: str | Path, *, units: LengthUnit | None = None, dialect: Ask
 
 def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = None, dialect: AskedDialect | None = None,
                allow_unknown: Iterable[str] = (), progress: ReadProgress | None = None,
-               tolerance: float = 0.0, cubics: bool = False) -> ReadResult:
+               tolerance: float = 0.0, cubics: CubicPieces = "") -> ReadResult:
     """Read the text of a CL file.
 
     Args:
@@ -84,8 +84,8 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
         allow_unknown: words that may be left out although they look like motion
         progress: called with (bytes read, bytes in all)
         tolerance: mm of the program; a share of it may go to arcs and chords in the place of splines
-        cubics: splines by chords at equal steps between their knots (`Role.CUBIC`), so that they can be written as what they
-            are; else by as few arcs or chords as the tolerance allows
+        cubics: "pieces": splines by chords at equal steps between their knots (`Role.CUBIC`), so that they can be written as
+            what they are; "uniform": as cubics with equal knots; else by as few arcs or chords as the tolerance allows
 
     Raises:
         ValueError: for a dialect or unit that does not exist (wrong use; faults of the file are diagnostics).

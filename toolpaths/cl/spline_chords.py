@@ -26,11 +26,21 @@ _BEZIER = np.array([[6.0, 0.0, 0.0, 0.0], [-5.0, 18.0, -9.0, 2.0], [2.0, -9.0, 1
 
 
 def spline_points(control: Floats, inner: Floats, chord: float) -> Floats:
-    """Points (M, 3) after the first of a clamped cubic on [0, 1] whose chords keep within `chord` of it.
+    """Points (M, 3) after the first of a clamped cubic on [0, 1] whose chords keep within `chord` of it; (0, 3) where those
+    that may be made are not proved.
 
-    control (n, 3); inner (n - 3,): the inner knots and 1. A short chord, h in the parameter, is off by h^2 |C'' x C'|
+    control (n, 3); inner (n - 3,): the inner knots and 1.
+    """
+    at = chord_places(control, inner, chord)
+    return de_boor(control, knots_of(inner), at[1:], DEGREE) if len(at) else np.zeros((0, 3))
+
+
+def chord_places(control: Floats, inner: Floats, chord: float) -> Floats:
+    """Parameters (M + 1,) from 0 to 1 between which the chords of `spline_points` lie.
+
+    A short chord, h in the parameter, is off by h^2 |C'' x C'|
     / (8 |C'|): equal steps of the integral of its root are the fewest chords (de Boor, Good approximation by splines with
-    variable knots, 1973). Where `_follows` does not prove them there are more; (0, 3) where those that may be made are not
+    variable knots, 1973). Where `_follows` does not prove them there are more; (0,) where those that may be made are not
     proved either.
     """
     knots = knots_of(inner)
@@ -38,15 +48,15 @@ def spline_points(control: Floats, inner: Floats, chord: float) -> Floats:
     count = int(np.clip(np.ceil(sums[-1]), 1, _MOST_CHORDS * len(control)))
     steps = np.linspace(0.0, sums[-1], count + 1)
     for number in range(_TRIES + _HALVINGS):
-        at = np.interp(steps, sums, edges)
+        at: Floats = np.interp(steps, sums, edges)
         bad = ~_follows(control, knots, at, chord)
         if not bad.any():
-            return de_boor(control, knots, at[1:], DEGREE)
+            return at
         if len(at) > _MOST_CHORDS * len(control):
             break
         steps = _more_steps(steps, bad) if number < _TRIES else np.sort(
             np.append(steps, 0.5 * (steps[:-1] + steps[1:])[bad]))
-    return np.zeros((0, 3))
+    return np.zeros(0)
 
 
 def _more_steps(steps: Floats, bad: Bools) -> Floats:
@@ -84,10 +94,16 @@ def _chords_before(control: Floats, knots: Floats, chord: float) -> tuple[Floats
 
 def _follows(control: Floats, knots: Floats, at: Floats, chord: float) -> Bools:
     """(M - 1,) True where the chord between two parameters of `at` (M,) is proved to be within `chord` of its piece, which
-    runs along it without turning back.
+    runs along it without turning back."""
+    return np.asarray(chord_errors(control, knots, at) <= chord)
+
+
+def chord_errors(control: Floats, knots: Floats, at: Floats) -> Floats:
+    """(M - 1,) mm within which the chord between two parameters of `at` (M,) is proved to follow its piece from end to end.
 
     Each part between knots is a Bezier cubic: its hull bounds how far it is off the chord, less what 3 t (1 - t) <= 3/4
     takes from how far the inner control points are off the line between the outer ones; it goes on where its hull does.
+    Where it does not, its hull is no further from the begin than it is large.
     """
     edges = np.union1d(at, knots)
     of: Ints = np.searchsorted(at, edges[:-1], side="right") - 1
@@ -102,25 +118,53 @@ def _follows(control: Floats, knots: Floats, at: Floats, chord: float) -> Bools:
     inner = np.linalg.norm(off[:, 1:3] - np.array([[2.0, 1.0], [1.0, 2.0]]) @ off[:, [0, 3]] / 3.0, axis=2).max(axis=1)
     away = np.linalg.norm(off[:, [0, 3]], axis=2).max(axis=1) + 0.75 * inner
     onward = (np.einsum("nik,nk->ni", np.diff(hull, axis=1), unit[of]) >= 0.0).all(axis=1)
-    small = np.linalg.norm(from_start, axis=2).max(axis=1) <= chord
-    result = np.ones(len(at) - 1, dtype=np.bool_)
-    np.logical_and.at(result, of, (onward & (away <= chord)) | small)
+    size = np.linalg.norm(from_start, axis=2).max(axis=1)
+    result = np.zeros(len(at) - 1)
+    np.maximum.at(result, of, np.where(onward, np.minimum(away, size), size))
     return result
 
 
-def cubic_points(control: Floats, inner: Floats, chord: float) -> tuple[Floats, Bools]:
+def cubic_points(control: Floats, inner: Floats, chord: float, always: bool = False) -> tuple[Floats, Bools]:
     """Points (M, 3) as of `spline_points`, of chords of equal steps between knots, their numbers powers of two; which (M,)
     are at a knot; none where `places_of` has none. Pieces that bend have four chords at least, so that their points show
-    that they are cubics."""
+    that they are cubics; `always`: all pieces."""
     knots = knots_of(inner)
     at = places_of(control, knots, chord)
     if not len(at):
         return np.zeros((0, 3)), np.zeros(0, dtype=np.bool_)
     breaks = np.unique(knots)
     counts = np.diff(np.searchsorted(at, breaks, side="right"))
-    counts = np.where(counts > 1, np.maximum(2 ** np.ceil(np.log2(np.maximum(counts, 1))).astype(int), _LEAST_CHORDS), 1)
+    powers = 2 ** np.ceil(np.log2(np.maximum(counts, 1))).astype(int)
+    counts = np.where((counts > 1) | always, np.maximum(powers, _LEAST_CHORDS), 1)
     at = np.concatenate([np.linspace(a, c, n + 1)[1:] for a, c, n in zip(breaks, breaks[1:], counts, strict=False)])
     return de_boor(control, knots, at, DEGREE), np.isin(at, breaks)
+
+
+def part_behind(control: Floats, inner: Floats, at: float) -> tuple[Floats, Floats]:
+    """(control points, inner knots and 1) of what is left of a clamped cubic behind a parameter: blossoms at the knots that
+    are left (Ramshaw, Blossoming, 1987)."""
+    knots = knots_of(inner)
+    rest = inner[inner > at]
+    own = np.concatenate([np.full(DEGREE + 1, at), rest, np.full(DEGREE, rest[-1])])
+    count = len(rest) + DEGREE
+    wide = np.flatnonzero(own[1:] > own[:-1])
+    of = own[wide[np.searchsorted(wide, np.arange(count))]]
+    spans = np.searchsorted(knots, of, side="right") - 1
+    arguments = own[np.arange(1, count + 1)[:, None] + np.arange(DEGREE)]
+    return _blossoms(control, knots, spans, arguments), (rest - at) / (rest[-1] - at)
+
+
+def _blossoms(control: Floats, knots: Floats, span: Ints, arguments: Floats) -> Floats:
+    """(K, 3) blossoms of the pieces that begin at knots `span` (K,) at their three arguments (K, 3): de Boor's recursion
+    with another argument at each level."""
+    d = control[span[:, None] + np.arange(-DEGREE, 1)]
+    for level in range(1, DEGREE + 1):
+        for j in range(DEGREE, level - 1, -1):
+            low, high = knots[span + j - DEGREE], knots[span + j + 1 - level]
+            t = np.where(high > low, (arguments[:, level - 1] - low) / np.where(high > low, high - low, 1.0), 0.0)[:, None]
+            d[:, j] = (1.0 - t) * d[:, j - 1] + t * d[:, j]
+    result: Floats = d[:, DEGREE]
+    return result
 
 
 def knots_of(inner: Floats) -> Floats:

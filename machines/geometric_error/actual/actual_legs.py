@@ -14,12 +14,13 @@ import numpy as np
 
 from machines.geometric_error.actual.actual import EDGE, Actual, ToolPlace
 from machines.geometric_error.actual.axis_motion import Line, actual_line, actual_tool, along, driven
-from machines.geometric_error.actual.error_rates import ErrorRates
+from machines.geometric_error.actual.error_rates import ErrorRates, gap_slopes_fit, sizes_of
 from machines.geometric_error.actual.leg_frame import LegFrame, leg_frame
-from machines.geometric_error.actual.leg_rates import legs_motion
+from machines.geometric_error.actual.leg_rates import bounded, errors_in_motion
 from machines.geometric_error.actual.rod_rates import tool_rates
 from machines.geometric_error.actual.rods import RodErrors
 from machines.geometric_error.actual.serial_errors import SerialErrors
+from machines.geometric_error.actual.series_rates import ToolSide, axes_there, series_rates
 from machines.geometric_error.actual.transforms import carried
 from machines.geometric_error.tables.names import SPINDLE, parse
 from machines.kinematics import columns
@@ -160,25 +161,22 @@ class ActualLegs(Actual):
         return tip, axis, side
 
     def error_rates(self, q: Floats, reach: Floats) -> ErrorRates | None:
-        """See the base class; None where carriers have errors, or more rods hold the platform than it has freedoms."""
+        """See the base class; None of joints on rings, and of rods that share and change their lengths."""
         frame, kin = self.frame, self.kinematics
-        if kin.loops.rings is not None or not frame.square or self.chain.axes - {SPINDLE}:
+        if not bounded(frame) or not gap_slopes_fit(self.chain):
             return None
         place, turn, _ = self._platform(self.coordinates(q))
         own, go = q[:, kin.legs_at], reach[:, kin.legs_at]
-        actual = legs_motion(frame.loops(self.rods), frame.leg, own, frame.solve(own, place, turn, self.rods), go)
-        nominal = legs_motion(frame.loops(frame.zero), frame.leg, own, (place, turn), go)
-        nominal = nominal if self.turns else nominal.translating()
-        arms, axes = [], []
-        for motion, chain in ((actual, self.chain), (nominal, SerialErrors())):
+        motions = errors_in_motion(frame, self.rods, own, (place, turn), go, not self.turns)
+        tips, axes = [], []
+        for motion, chain in zip(motions, (self.chain, SerialErrors()), strict=True):
             tip, axis, _ = actual_tool(UP, kin.tool_length, chain)
-            arms.append(motion.turned @ (tip + kin.gauge))
+            tips.append(motion.turned @ (tip + kin.gauge))
             axes.append(motion.turned @ axis)
         none = np.zeros(len(q))
-        tool = tool_rates(actual, nominal, (arms[0], arms[1]), (axes[0], axes[1]), go, none, none)
-        found = np.zeros((4, *q.shape))
-        found[0][:, kin.legs_at], found[1][:, kin.legs_at] = tool.tip, tool.axis
-        return ErrorRates(*found)
+        tool = tool_rates(*motions, (tips[0], tips[1]), (axes[0], axes[1]), go, none, none)
+        under = axes_there(self.lines, self.chain, (q, reach), place + tips[1], (tool.nominal_tip * go).sum(axis=1))
+        return series_rates(tool, kin.legs_at, under, ToolSide((), sizes_of(self.chain, SPINDLE), kin.tool_length), q, reach)
 
     def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
         """See the base class: T^-1 S (E-15), carried to the tip, then the carriers' and the spindle's."""

@@ -14,12 +14,17 @@ import numpy as np
 
 from machines.geometric_error.actual.actual import EDGE, Actual, ToolPlace
 from machines.geometric_error.actual.axis_motion import Line, actual_line, actual_tool, along, driven
+from machines.geometric_error.actual.error_rates import ErrorRates, gap_slopes_fit, sizes_of
 from machines.geometric_error.actual.leg_frame import LegFrame, leg_frame
+from machines.geometric_error.actual.leg_rates import bounded, errors_in_motion
+from machines.geometric_error.actual.rod_rates import tool_rates
 from machines.geometric_error.actual.rods import RodErrors
 from machines.geometric_error.actual.serial_errors import SerialErrors
+from machines.geometric_error.actual.series_rates import ToolSide, axes_there, series_rates
 from machines.geometric_error.actual.transforms import carried
 from machines.geometric_error.tables.names import SPINDLE, parse
 from machines.kinematics import columns
+from machines.kinematics.chain import Joint
 from machines.kinematics.columns import Columns
 from machines.kinematics.legs.in_series import LegsInSeries
 from toolpaths.arrays import Bools, Floats
@@ -132,6 +137,42 @@ class ActualSeries(Actual):
             centre = point + (after if line.moving else at) @ (line.reference - line.joint.point)
             yield line, at, after, point, centre
             origin, at = point - after @ line.joint.point, after
+
+    def error_rates(self, q: Floats, reach: Floats) -> ErrorRates | None:
+        """See the base class; None of joints on rings, and of rods that share and change their lengths."""
+        frame, kin, w = self.frame, self.kinematics, self.coordinates(q)
+        legs, count = kin.on_legs, len(kin.tables)
+        if not bounded(frame) or not gap_slopes_fit(self.chain):
+            return None
+        turn, shift = kin.legs_at_place(w[:, :3])[1:]
+        go, pose = reach[:, legs.legs_at], (w[:, :3] - shift, turn)
+        motions = errors_in_motion(frame, self.rods, q[:, legs.legs_at], pose, go, not kin.follows)
+        tip = np.tile(legs.gauge - kin.tool_length * UP, (len(w), 1))
+        head = axes_there(self.lines[count:], self.chain, (q, reach), tip, np.zeros(len(w)))
+        side = ToolSide(head, sizes_of(self.chain, SPINDLE), kin.tool_length)
+        tips, axes = ([np.einsum("nij,nj->ni", motion.turned, v) for motion, v in zip(motions, each, strict=True)]
+                      for each in zip(self._in_platform(w), kin.tool(w[:, 3:])[:2], strict=True))
+        goes = [np.broadcast_to(far, len(w)) for far in side.goes()]
+        tool = tool_rates(*motions, (tips[0], tips[1]), (axes[0], axes[1]), go, goes[0], goes[1])
+        slid = (tool.nominal_tip * go).sum(axis=1) + goes[0]
+        before = [*self.lines[:count], *self._carriers]
+        under = axes_there(before, self.chain, (q, reach), pose[0] + tips[1], slid)
+        return series_rates(tool, legs.legs_at, under, side, q, reach)
+
+    @property
+    def _carriers(self) -> list[Line]:
+        """Slides between the tables and the legs; they have no errors here."""
+        own = self.kinematics.on_legs
+        return [actual_line(Joint(own.axis_names[j], False, u, np.zeros(3)), int(j), SerialErrors())
+                for j, u in zip(own.carriers_at, own.carriers, strict=True)]
+
+    def _in_platform(self, w: Floats) -> tuple[Floats, Floats]:
+        """(tip, axis) (N, 3) of the tool, with the errors of spindle and axes of the head, in directions of the platform."""
+        kin, count = self.kinematics, len(self.kinematics.tables)
+        tool: list[Columns] = [columns.of_one(v) for v in actual_tool(UP, kin.tool_length, self.chain)]
+        tool[0] = columns.plus(tool[0], columns.of_one(kin.on_legs.gauge))
+        tool = self._driven(range(self.turns - 1, count - 1, -1), w[:, 3:], None, tool)
+        return columns.to_rows(tool[0], len(w)), columns.to_rows(tool[1], len(w))
 
     def sensitivity(self, w: Floats, direction: Floats | None = None) -> Floats:
         """See the base class: the platform's, the rotary axes', the spindle's, all at the tip in the table frame."""

@@ -23,7 +23,7 @@ from toolpaths.arrays import Floats
 from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
-_ROUNDS = 8
+_ROUNDS = 16
 _GROWTH = 1.05
 UNBOUNDED = 1e30
 """a rate where no bound was found: shorter pieces may have one"""
@@ -155,20 +155,68 @@ class HeldLoops:
     def _change(self, assumed: Floats) -> tuple[Floats, Floats]:
         """The same while columns of J change by up to `assumed`; NaN where there is no bound."""
         with np.errstate(over="ignore", invalid="ignore"):
-            swing = ((self.turn + assumed / self.lever) * self.reach).sum(axis=1)
-            drift = (assumed * self.reach).sum(axis=1)[:, None] * np.hypot(1.0, self.arm / self.lever)
-            away = (self.turn * self.reach).sum(axis=1)[:, None] * self.arm * swing[:, None]
-            rod = (self.rates * self.reach[:, None]).sum(axis=2) + drift + away + self.bend
-            arm = self.arm * swing[:, None]
-            off = np.hypot(rod, (self.arm * rod + arm * self.length) / self.lever)
-            wrong = rod[:, :, None] * self.rates + (self.length * arm)[:, :, None] * self.turn[:, None] + self.gain
-            if self.holds is not None:
-                far = ((self.holds.shift + assumed) * self.reach).sum(axis=1)
-                more = self.holds.change(swing, far, self.turn, self.lever)
-                off, wrong = np.hstack([off, more[0]]), np.concatenate([wrong, more[1]], axis=1)
+            off, wrong, swing = self.rows_change(assumed)
             off = np.linalg.norm(off, axis=1)
             grip = 1.0 / np.where(off < self.least, self.least - off, np.nan)
             return grip[:, None] * np.linalg.norm(wrong, axis=1), swing
+
+    def rows_change(self, assumed: Floats) -> tuple[Floats, Floats, Floats]:
+        """(mm that rows of W change by (N, R), (D' - D) - (W' - W) J (N, R, K), rad of the platform (N,)) at most."""
+        swing = ((self.turn + assumed / self.lever) * self.reach).sum(axis=1)
+        drift = (assumed * self.reach).sum(axis=1)[:, None] * np.hypot(1.0, self.arm / self.lever)
+        away = (self.turn * self.reach).sum(axis=1)[:, None] * self.arm * swing[:, None]
+        rod = (self.rates * self.reach[:, None]).sum(axis=2) + drift + away + self.bend
+        arm = self.arm * swing[:, None]
+        off = np.hypot(rod, (self.arm * rod + arm * self.length) / self.lever)
+        wrong = rod[:, :, None] * self.rates + (self.length * arm)[:, :, None] * self.turn[:, None] + self.gain
+        if self.holds is not None:
+            far = ((self.holds.shift + assumed) * self.reach).sum(axis=1)
+            more = self.holds.change(swing, far, self.turn, self.lever)
+            off, wrong = np.hstack([off, more[0]]), np.concatenate([wrong, more[1]], axis=1)
+        return off, wrong, swing
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+@arrays(spans="R", stretch="N", loose="N R K", moved="N R K", size="N", shift="N K")
+class SharedLoops(HeldLoops):
+    """Of rods that are more than the freedoms, of fixed lengths: they share what is too much by least squares, G^T g = 0.
+
+    g (R) are their stretches, G = dg/dx = W / l, B = -dg/dq = D / l, J0 = (G^T G)^-1 G^T B and e = B - G J0, of which G^T e
+    is 0. With S the sum of g_r d2g_r/dx2, (G^T G + S) J = G^T B - (dG/dq)^T g anywhere, so that
+
+        (G'^T G' + S') (J' - J0) = G'^T ((B' - B) - (G' - G) J0) + (G' - G)^T e - (dG'/dq)^T g' - S' J0.
+
+    Attributes:
+        spans: (R,) mm, l
+        stretch: (N,) mm, |g|
+        loose: (N, R, K) e; moved: (N, R, K) |dG/dq| at most; size: (N,) |G|; shift: (N, K) mm of X by J0
+    """
+
+    spans: Floats
+    stretch: Floats
+    loose: Floats
+    moved: Floats
+    size: Floats
+    shift: Floats
+
+    def _change(self, assumed: Floats) -> tuple[Floats, Floats]:
+        with np.errstate(over="ignore", invalid="ignore"):
+            rows, each, swing = self.rows_change(assumed)
+            off, wrong = np.linalg.norm(rows / self.spans, axis=1), np.linalg.norm(each / self.spans[:, None], axis=1)
+            loose, size = np.linalg.norm(self.loose, axis=1), self.size + off
+            more = ((loose + wrong + size[:, None] * assumed) * self.reach).sum(axis=1)
+            stretch = self.stretch + more
+            share = self.arm / self.lever
+            bend = (1.0 + share) ** 2 / self.spans + self.arm / self.lever**2 * (1.0 + stretch[:, None] / self.spans)
+            second = stretch * np.linalg.norm(bend, axis=1)
+            least = np.where(off < self.least, self.least - off, np.nan)
+            ends = self.shift[:, None] + self.arm[:, None] * self.turn[:, None]
+            bent = ((1.0 + share) / self.spans)[:, None] * ends + share[:, None] * self.turn[:, None]
+            slopes = np.linalg.norm(bent, axis=1) + np.linalg.norm(self.moved, axis=1)
+            rest = off[:, None] * loose + stretch[:, None] * slopes
+            soft = 1.0 - second / least**2
+            found = (wrong / least[:, None] + rest / least[:, None] ** 2) / np.where(soft > 0.0, soft, np.nan)[:, None]
+            return found, swing
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,11 @@ import numpy as np
 
 from machines.geometric_error.tables.curves import Curve, Fourier, Polynomial, TableCurve
 from toolpaths.arrays import Floats, within
+from toolpaths.compiled import compiled, loop, wanted
+
+COMPILE_FROM = 20_000
+"""positions that are worth compiling for; fewer take the loop where any is compiled anyway"""
+_ROWS, _NUMBERS = ("float64", 2), ("float64", 1)
 
 
 class Bank(ABC):
@@ -104,10 +109,14 @@ class LinearBank(Bank):
         self.x = approaches[0][0]
         self.y = np.array([y for _, y in approaches])
         self.slope = np.diff(self.y, axis=1) / np.diff(self.x)
+        self.by_row = np.ascontiguousarray(self.y.T), np.ascontiguousarray(self.slope.T)
 
     def at(self, x: Floats, direction: Floats | float) -> Floats:
         """See the base class."""
         inside = self.first.inside(x)
+        if wanted(len(x), COMPILE_FROM):
+            share = np.broadcast_to(_share(direction), inside.shape) if self.first.both else inside[:0]
+            return compiled(table_values)(inside, self.x, *self.by_row, share)
         row = within(np.searchsorted(self.x, inside, side="right") - 1, 0, len(self.x) - 2)
         found = self.y[:, row] + self.slope[:, row] * (inside - self.x[row])
         return found if not self.first.both else _shared(found, direction)
@@ -132,6 +141,39 @@ class SplineBank(Bank):
 
 def _shared(found: Floats, direction: Floats | float) -> Floats:
     """(C, N) of values (2 C, N), forwards and backwards by turns, by shares of the approach direction."""
-    share = 0.5 * (1.0 + within(direction, -1.0, 1.0))
-    result: Floats = found[1::2] + share * (found[0::2] - found[1::2])
+    result: Floats = found[1::2] + _share(direction) * (found[0::2] - found[1::2])
+    return result
+
+
+def _share(direction: Floats | float) -> Floats:
+    """Share of the values forwards."""
+    return np.asarray(0.5 * (1.0 + within(direction, -1.0, 1.0)))
+
+
+@loop(takes=(_NUMBERS, _NUMBERS, _ROWS, _ROWS, _NUMBERS))
+def table_values(inside: Floats, x: Floats, y: Floats, slope: Floats, share: Floats) -> Floats:
+    """(C, N) values of linear tables at positions within them (N,).
+
+    Args:
+        x: (M,) positions of the rows; y: (M, C), slope: (M - 1, C), twice as many columns with two approach directions
+        share: (N,) of the values forwards, which stand before those backwards; (0,) with one direction
+    """
+    both = len(share) > 0
+    count = y.shape[1] // 2 if both else y.shape[1]
+    result = np.empty((count, len(inside)))
+    for n in range(len(inside)):
+        row, behind = 0, len(x) - 1
+        while behind - row > 1:
+            middle = (row + behind) // 2
+            if x[middle] <= inside[n]:
+                row = middle
+            else:
+                behind = middle
+        along = inside[n] - x[row]
+        for c in range(count):
+            if both:
+                back = y[row, 2 * c + 1] + slope[row, 2 * c + 1] * along
+                result[c, n] = back + share[n] * (y[row, 2 * c] + slope[row, 2 * c] * along - back)
+            else:
+                result[c, n] = y[row, c] + slope[row, c] * along
     return result

@@ -9,6 +9,7 @@ import numpy as np
 from machines.kinematics import columns
 from machines.kinematics.base import ErrorForm, ErrorForms, as_points
 from machines.kinematics.clearance_geometry import ClearanceGeometry
+from machines.kinematics.leg_motion import LegMotion, LegParts, RotaryNext
 from machines.kinematics.legs.series_poses import PlatformFrame, PosesInSeries
 from machines.kinematics.rod_loops import by_parts
 from machines.kinematics.taylor import ZERO, TaylorAngle, TaylorVector
@@ -33,6 +34,21 @@ class LegsInSeries(PosesInSeries):
     def over_workspace(self) -> LegsInSeries:
         """Itself."""
         return self
+
+    @property
+    def leg_parts(self) -> LegParts | None:
+        """See the base class; None of legs on rings."""
+        if (parts := self.on_legs.leg_parts) is None:
+            return None
+        first, count = self.legs_joints, len(self.tables)
+        axes = [RotaryNext(joint.name, first + k, joint.direction, joint.point, k >= count)
+                for k, joint in enumerate(self.turning)]
+        return replace(parts, axes=(*axes[:count][::-1], *axes[count:]))
+
+    def leg_motion(self, q: Floats, rate: Floats, acceleration: Floats) -> LegMotion:
+        """See the base class: of the legs."""
+        k = self.legs_joints
+        return self.on_legs.leg_motion(q[:, :k], rate[:, :k], acceleration[:, :k])
 
     # ---- rates, bounds -------------------------------------------------------------------------------------
 

@@ -83,6 +83,20 @@ class OnLegs(RedundantLegs):
         """Itself."""
         return self
 
+    # ---- assembly modes ------------------------------------------------------------------------------------
+
+    @property
+    def in_loops(self) -> tuple[bool, ...]:
+        """All but the carriers, which take legs and platform along as they are."""
+        return tuple(j not in set(self.carriers_at) for j in range(self.joints))
+
+    def carried(self, pose: Floats, q0: Floats, q1: Floats) -> Floats:
+        """See the base class: by the carriers."""
+        if not len(self.carriers_at):
+            return pose
+        shift = (q1 - q0)[:, self.carriers_at] @ self.carriers
+        return np.hstack([pose[:, :3] + shift, pose[:, 3:]])
+
     # ---- geometric errors ----------------------------------------------------------------------------------
 
     @property
@@ -194,7 +208,7 @@ class OnLegs(RedundantLegs):
             return None
         of = self.legs
         return LegParts(self.legs_at, of.points, of.directions, of.lengths, of.arm, of.stretch > 0.0, self.carriers_at,
-                        self.carriers)
+                        self.carriers, self.gauge)
 
     def leg_motion(self, q: Floats, rate: Floats, acceleration: Floats) -> LegMotion:
         """See the base class."""

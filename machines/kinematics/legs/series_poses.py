@@ -92,6 +92,11 @@ class PosesInSeries(Kinematics):
         return (*self.on_legs.drives_tip, *(self.follows for _ in self.turning))
 
     @property
+    def in_loops(self) -> tuple[bool, ...]:
+        """Those of the legs."""
+        return (*self.on_legs.in_loops, *(False for _ in self.turning))
+
+    @property
     def turns_tool(self) -> tuple[bool, ...]:
         """The rotary axes, and legs whose platform turns."""
         return (*self.on_legs.turns_tool, *(True for _ in self.turning))
@@ -256,11 +261,13 @@ class PosesInSeries(Kinematics):
         return found[0], found[1], found[2]
 
     def carried(self, pose: Floats, q0: Floats, q1: Floats) -> Floats:
-        """The pose (N, 6) at joints q0 (N, J) with the rotary axes where they are at q1 (N, J), the platform as it is."""
-        k = self.legs_joints
-        if bool((q0[:, k:] == q1[:, k:]).all()):
+        """The pose (N, 6) at joints q0 (N, J), carriers and rotary axes as at q1 (N, J), the legs as they are."""
+        k, own = self.legs_joints, self.on_legs
+        shift = (q1 - q0)[:, own.carriers_at] @ own.carriers
+        if bool((q0[:, k:] == q1[:, k:]).all()) and not shift.any():
             return pose
-        return np.hstack(self.placed(*self.platform_at(pose, q0[:, k:]), q1[:, k:])[:2])
+        place, turn = self.platform_at(pose, q0[:, k:])
+        return np.hstack(self.placed(place + shift, turn, q1[:, k:])[:2])
 
     def assembly_modes(self, q: Floats) -> tuple[Floats, Floats]:
         """See the base class: those of the legs."""

@@ -17,7 +17,7 @@ from machines.kinematics.clearance_geometry import ClearanceGeometry, ClearanceS
 from machines.kinematics.columns import blocks
 from machines.kinematics.frames import spin_about
 from machines.kinematics.leg_geometry import LegGeometry
-from machines.kinematics.leg_motion import FifthAxis, LegMotion, LegParts
+from machines.kinematics.leg_motion import LegMotion, LegParts, RotaryNext
 from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.on_legs import OnLegs
 from machines.kinematics.legs.one_turn import OneTurn
@@ -256,7 +256,8 @@ class LegsWithAxis(Kinematics):
         """See the base class."""
         parts = self.on_legs.leg_parts
         assert parts is not None
-        return replace(parts, axis=FifthAxis(self.letter, *self.axis.line(), self.axis.at_spindle))
+        axis = RotaryNext(self.letter, self.joints - 1, *self.axis.line(), self.axis.at_spindle)
+        return replace(parts, axes=(axis,), gauge=self.axis.gauge)
 
     def leg_motion(self, q: Floats, rate: Floats, acceleration: Floats) -> LegMotion:
         """See the base class: of the legs."""

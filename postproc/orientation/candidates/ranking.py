@@ -78,43 +78,42 @@ class StretchKnots:
     def seconds(self, q: Floats, limits: JointLimits) -> float:
         """Least time for joints (N, J) at the sites."""
         moving = np.ptp(q, axis=0) > _MOVES
-        forces = self._forces(q, limits.forces)
+        motors = limits.forces
         limits = JointLimits(limits.velocity[moving], limits.acceleration[moving], limits.jerk[moving])
         fitted = make_interp_spline(self.s, q[:, moving], k=DEGREE, check_finite=False).c
         dq, d2q, d3q = (self.slopes @ fitted).reshape(3, len(self.sigma), -1)
         cap = np.minimum(self.cap, squared_speed(dq, limits.velocity))
-        if forces is not None:
+        middle = None
+        if motors is not None:
+            *forces, own = self._forces(q, motors, np.sqrt(cap))
+            middle = np.column_stack((np.zeros_like(dq), own))
             free, one = np.full(q.shape[1], np.inf), np.ones(q.shape[1])
             limits = JointLimits(np.append(limits.velocity, free), np.append(limits.acceleration, one),
                                  np.append(limits.jerk, free))
             dq, d2q, d3q = (np.column_stack(pair) for pair in zip((dq, d2q, d3q), forces, strict=True))
         if not self.jerky:
-            return least_time(self.sigma, second_order(self.sigma, dq, d2q, limits.acceleration, cap, self.method.kernel))
+            return least_time(self.sigma, second_order(self.sigma, dq, d2q, limits.acceleration, cap, self.method.kernel,
+                                                       middle))
         free = np.isinf(cap)
         cap[free] = UNBOUND * steady_cap(d2q[free], d3q[free], limits)
-        return self._third_order(dq, d2q, d3q, cap, limits)
+        return self.solved(dq, d2q, d3q, cap, limits, middle)[0]
 
-    def _forces(self, q: Floats, forces: MotorLimits | None) -> tuple[Floats, Floats, Floats] | None:
-        """Rows (K, J) of the forces of joints (N, J) at the sites."""
-        if forces is None:
-            return None
+    def _forces(self, q: Floats, forces: MotorLimits, speed: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Rows (K, J) of the forces of joints (N, J) at the sites, at speeds up to (K,), and their middles."""
         fitted = make_interp_spline(self.s, q, k=DEGREE, check_finite=False)
         dq, d2q, _ = (self.slopes @ fitted.c).reshape(3, len(self.sigma), -1)
-        first, second = forces.rows(fitted(self.eased.inside(self.eased.parameter(self.sigma)[0])), dq, d2q)
-        return first, second, np.zeros_like(first)
+        first, second, middle = forces.rows(fitted(self.eased.inside(self.eased.parameter(self.sigma)[0])), dq, d2q, speed)
+        return first, second, np.zeros_like(first), middle
 
-    def _third_order(self, dq: Floats, d2q: Floats, d3q: Floats, cap: Floats, limits: JointLimits) -> float:
-        """With jerk; derivatives (K, J) by sigma, `cap` (K,) of the squared speed."""
-        return self.solved(dq, d2q, d3q, cap, limits)[0]
-
-    def solved(self, dq: Floats, d2q: Floats, d3q: Floats, cap: Floats,
-               limits: JointLimits) -> tuple[float, Floats, Multipliers]:
+    def solved(self, dq: Floats, d2q: Floats, d3q: Floats, cap: Floats, limits: JointLimits,
+               middle: Floats | None = None) -> tuple[float, Floats, Multipliers]:
         """Least time, x and its two derivatives by sigma (3, K) at the knots, and the multipliers of all limits; arguments
-        as of `SpeedProblem`, derivatives (K, J). It starts from the motion of the call before."""
+        as of `SpeedProblem`, derivatives and `middle` (K, J). It starts from the motion of the call before."""
         basis = rest_basis(self.sigma, self.eased.ease)
         first, second, third = (np.ascontiguousarray(order.T) for order in (dq, d2q, d3q))
         problem = SpeedProblem(basis, first, second, third, limits, cap, np.zeros(len(cap), dtype=np.int64), self.weight,
-                               np.ones((2, len(cap))), np.full(len(cap), -1))
+                               np.ones((2, len(cap))), np.full(len(cap), -1),
+                               middle=None if middle is None else np.ascontiguousarray(middle.T))
         found = solve_problem(problem, self.method.steps, self.near)
         self.near = found.c
         x = basis.values(found.c)

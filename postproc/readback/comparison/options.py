@@ -31,15 +31,24 @@ def check_options(code: Canonical, motion: Motion, job: Job, faults: Faults) -> 
         "smoothing": _smoothed(code) if not job.controller.program.exact_path else np.zeros(0, dtype=np.int64),
         "rigid_tapping": codes(code.words, "M", M29)[0] if job.controller.cycles.floating else np.zeros(0, dtype=np.int64)}
     lines = {name: in_files(code.line[blocks], code.files) for name, blocks in used.items() if len(blocks)}
-    lines["splines"] = in_files(code.line[code.words.pick(CURVE)[0]], code.files)
+    lines["splines"] = in_files(code.line[_unstated_curves(code, job)], code.files)
     helices = np.flatnonzero((motion.code == 2) & (np.abs(_rise(motion, job)) > RISES))
     if len(helices):
         lines["helical"] = motion.line[helices]
     return [faults.error("verify.option", f"the program uses an option that the control does not have by the machine "
                          f"file: {name} = false", 0, int(found[0]), len(found), "convert again, or state the option under "
                          "[control] of the machine file where it is fitted")
-            for name, found in lines.items() if len(found) and (options.absent(name) or (
-                name == "splines" and not options.confirmed(name)))]
+            for name, found in lines.items() if len(found) and (options.absent(name) or name == "splines")]
+
+
+def _unstated_curves(code: Canonical, job: Job) -> Ints:
+    """Blocks that run splines otherwise, by coefficients or by control points, than the machine file says that it can."""
+    blocks, curve = code.words.pick(CURVE)
+    options = job.machine.options
+    if not options.confirmed("splines"):
+        return blocks
+    number = code.splines[curve.astype(np.int64)] if len(code.splines) else np.full(len(blocks), -1)
+    return np.asarray(blocks[(number >= 0) != options.control_points])
 
 
 def _smoothed(code: Canonical) -> Ints:

@@ -164,7 +164,7 @@ class SiemensReader(Reader):
         value[units] = np.where(np.isin(value[units], (70, 700)), 20.0, 21.0)
         drop |= (letter == ord(STATEMENT)) | np.isin(letter, [ord(a) for a in (*"LP", ROUNDED, ROUNDED_RAPID)])
         return Canonical(added(Words(letter, value, words.line, words.lines), new, drop), line, laws, drills,
-                         curves=run.polynomials.stacked()), found
+                         curves=run.polynomials.stacked(), splines=np.array(run.polynomials.splines, dtype=np.int64)), found
 
     def _feeds_apart(self, words: Words, line: Ints, file: str) -> list[Diagnostic]:
         """F while G70 holds: it leaves feeds in the basic system, mm or inches as MD10240 has it (S1, 3.1.6)."""

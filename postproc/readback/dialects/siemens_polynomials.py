@@ -1,7 +1,12 @@
-"""Polynomial interpolation of SINUMERIK: POLY, PO[X]=(end, a2, a3), X=PO(end, a2 ... a5), PL= (Job Planning, POLY).
+"""Polynomial interpolation of SINUMERIK: POLY, PO[X]=(end, a2, a3), X=PO(end, a2 ... a5), PL= (Job Planning, POLY), and
+BSPLINE.
 
 f(p) = a0 + a1 p + a2 p2 + ... for p from 0 to PL, 1 where a block does not state it; a0 is where the block before has ended,
 a1 what leads to the end. Axes without coefficients go straight. G0 to G3 end it.
+
+BSPLINE: blocks state control points of a cubic, which begins where the block before has ended and is tangential to the
+control polygon at both ends (Programming Guide Advanced 04.00, p. 153; Job Planning 02/2011, p. 248): its end
+knots are fourfold. Which step between nodes the PL of a block is of, no page says; where all are equal it is the same curve.
 """
 
 from __future__ import annotations
@@ -15,12 +20,15 @@ from postproc.readback.text.canonical import CURVE, STATEMENT, DialectStatement
 from postproc.readback.text.modal import codes
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Floats
+from toolpaths.cl.spline_chords import DEGREE
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?"
 _TERMS = re.compile(rf"(?<![A-Z0-9_$])(?:PO\s*\[\s*(?P<of>[A-Z]?)\s*\]\s*=\s*\((?P<terms>[^()]*)\)"
-                    rf"|(?P<axis>[A-Z])\s*=\s*PO\s*\((?P<more>[^()]*)\)|PL\s*=\s*(?P<range>{_NUMBER}))")
+                    rf"|(?P<axis>[A-Z])\s*=\s*PO\s*\((?P<more>[^()]*)\)|(?P<word>PL|PW|SD)\s*=\s*(?P<range>{_NUMBER}))")
 _MOTION = (0, 1, 2, 3)
-NAMES = ("POLY", "PO", "PL")
+NAMES = ("POLY", "PO", "PL", "BSPLINE", "PW", "SD")
+_STATED = {"PW": 1.0, "SD": 3.0}
+"""weights and degree of a BSPLINE as they are where no block states them"""
 MOST = 5
 """degree"""
 
@@ -30,7 +38,7 @@ def terms_apart(row: str, line: int, new: New, statements: list[DialectStatement
     def cut(match: re.Match[str]) -> str:
         axis, text = match["of"] or match["axis"] or "", match["terms"] if match["terms"] is not None else match["more"]
         if match["range"] is not None:
-            made = DialectStatement("PL", (_value(match["range"]),))
+            made = DialectStatement(match["word"], (_value(match["range"]),))
         else:
             made = DialectStatement("PO", (axis, *(_value(part.strip()) for part in text.split(","))))
             if axis and made.number(1) == made.number(1):
@@ -38,7 +46,7 @@ def terms_apart(row: str, line: int, new: New, statements: list[DialectStatement
         new.append((line, STATEMENT, float(len(statements))))
         statements.append(made)
         return " "
-    return _TERMS.sub(cut, row) if "PO" in row or "PL" in row else row
+    return _TERMS.sub(cut, row) if any(word in row for word in ("PO", "PL", "PW", "SD")) else row
 
 
 def _value(text: str) -> float:
@@ -53,6 +61,9 @@ class Polynomials:
         self.ended = codes(words, "G", _MOTION)[0]
         self.begun = -1
         self.curves: list[Floats] = []
+        self.splines: list[int] = []
+        self.polygons: list[int] = []
+        """blocks in which BSPLINE stands"""
 
     def stacked(self) -> Floats:
         """(C, 3, 4) coefficients."""
@@ -60,10 +71,11 @@ class Polynomials:
 
     def block(self, b: int, here: list[DialectStatement], unit: float, new: New) -> str:
         """Words of block b, `unit` mm in a unit of length; what is wrong with it, "" for nothing."""
-        if any(s.name == "POLY" for s in here):
+        for name in {s.name for s in here} & {"POLY", "BSPLINE"}:
             if b in self.ended:
-                return "POLY next to another code of motion"
-            self.begun = b
+                return f"{name} next to another code of motion"
+            self.begun = b if name == "POLY" else -1
+            self.polygons += [b] if name == "BSPLINE" else []
             new.append((b, "G", 1.0))
         terms = [s for s in here if s.name == "PO"]
         if not terms:
@@ -87,4 +99,37 @@ class Polynomials:
             curve["XYZ".index(str(s.args[0])), :len(values) - 1] = values[1:]
         new.append((b, CURVE, float(len(self.curves))))
         self.curves.append(curve * length ** np.arange(2.0, MOST + 1.0) * unit)
+        self.splines.append(-1)
         return ""
+
+    def control_points(self, blocks: dict[int, list[DialectStatement]], words: Words, axes: tuple[str, ...],
+                       new: New) -> list[tuple[int, str]]:
+        """Words of the control points of each BSPLINE, of the statements of blocks by their number; what is wrong, with its
+        block. It ends with the next code of motion; blocks without axes are none of its points."""
+        moving = np.unique(words.line[np.isin(words.letter & 95, [ord(a) for a in axes])])
+        others = [b for b, here in blocks.items() if any(s.name == "POLY" for s in here)]
+        stops = np.sort([*self.ended, *self.polygons, *others, words.lines + 1])
+        wrong = []
+        for number, begin in enumerate(self.polygons):
+            end = int(stops[np.searchsorted(stops, begin, side="right")])
+            rows = moving[(moving >= begin) & (moving < end)].tolist()
+            stated = [s for b in range(begin, end) for s in blocks.get(b, ())]
+            if why := _refused(stated, [blocks.get(b, []) for b in rows], end in self.polygons):
+                wrong.append((begin, why))
+                continue
+            new += [(b, CURVE, float(len(self.curves) + n)) for n, b in enumerate(rows)]
+            self.curves += [np.zeros((3, MOST - 1))] * len(rows)
+            self.splines += [number] * len(rows)
+        return wrong
+
+
+def _refused(stated: list[DialectStatement], points: list[list[DialectStatement]], again: bool) -> str:
+    """Why a BSPLINE is not executed, by all its statements and those of the blocks of its points; "" where it is."""
+    if any(s.number(0) != value for s in stated for name, value in _STATED.items() if s.name == name):
+        return "BSPLINE with PW other than 1, or SD other than 3"
+    lengths = [[s.number(0) for s in here if s.name == "PL"] for here in points]
+    if any(len(one) != 1 for one in lengths) or len({one[0] for one in lengths}) != 1 or not lengths[0][0] > 0.0:
+        return "BSPLINE without the same PL in all its blocks: which step between nodes each is of no page says"
+    if len(points) < DEGREE:
+        return f"BSPLINE with {len(points)} control points behind the first"
+    return "BSPLINE behind BSPLINE, which may go on or begin again," if again else ""

@@ -107,6 +107,9 @@ class SiemensRun:
                 modal.append((b, -1))
             for s in all_here:
                 self.one(b, s, modal, "MCALL" in names)
+        for b, wrong in self.polynomials.control_points(blocks, self.words, self.axes, self.new):
+            self.fault("gcode.curve", b, f"{wrong} is not executed", "state PL in each block, the same in all, PW and SD "
+                       "as they are without them, or write such a curve as lines or arcs")
         self.modal_calls(modal)
         self.turned_behind_taps([b for b, _ in modal])
         self.turned_lengths()

@@ -65,7 +65,7 @@ def walk(kin: Kinematics, q0: Floats, q1: Floats, pose: Floats) -> Floats:
 def steps(kin: Kinematics, q0: Floats, q1: Floats, turn: float = ROTARY_STEP) -> Ints:
     """(N,) steps of at most LINEAR_STEP mm, ROTARY_STEP of cranks and `turn` rad of other rotary axes in which blocks are
     walked, 1 at least."""
-    longest = np.where(kin.rotary, np.where(kin.drives_tip, ROTARY_STEP, turn), LINEAR_STEP)
+    longest = np.where(kin.rotary, np.where(kin.in_loops, ROTARY_STEP, turn), LINEAR_STEP)
     size = np.nan_to_num((np.abs(q1 - q0) / longest).max(axis=1, initial=0.0))
     return np.asarray(np.clip(np.ceil(size), 1, 1e15), dtype=np.int64)
 

@@ -37,7 +37,7 @@ def run_section(section: BlockSection, frame: ExecutionFrame, number: int, posit
     start, moving = frame.coordinates(position[None, :])[0], _moving(section)
     _refused(section, frame, moving, code.line, file, found)
     cycles = bool((moving & among(section.motion, CYCLES)).any() or np.isfinite(section.call).any())
-    size = len(moving) if cycles or section.has_steps or section.radius.any() else _PART
+    size = len(moving) if cycles or section.has_steps or section.radius.any() or len(code.splines) else _PART
     parts: list[MotionRows] = []
     for first in range(0, len(moving), size):
         part = slice(first, first + size)
@@ -77,7 +77,8 @@ def _rows(section: BlockSection, frame: ExecutionFrame, number: int, start: Floa
         rows = _with_legs(rows, line, spelt)
     rows = _with_arcs(rows, state, line, code.line, file, found)
     if len(code.curves):
-        rows = with_curves(rows, start, section.curve[rows.block - section.first], code.curves, offsets.xyz)
+        rows = with_curves(rows, start, section.curve[rows.block - section.first], code.curves,
+                           code.splines, offsets.xyz)
     if (shift := section.radius[rows.block - section.first]).any():
         rows, faults = with_radius(rows, start, shift, _held(section, rows, moving, code), offsets.xyz, offsets.corners)
         found += [error("gcode.compensation", f"cutter compensation by the radius: {said}", file=file,

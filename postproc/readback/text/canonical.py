@@ -14,7 +14,7 @@ import numpy as np
 
 from postproc.control.control import InterpolationMode
 from postproc.readback.text.words import Words
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, among
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.shapes import arrays
@@ -130,12 +130,14 @@ class Drill:
 
 
 @dataclass(frozen=True)
-@arrays(line="B", curves="C 3 4")
+@arrays(line="B", curves="C 3 4", splines="S")
 class Canonical:
     """B blocks in the order in which the control runs them; words count blocks from 1.
 
     `line` (B + 1,) is the line that a block stands in; lines of further files count on from those before.
-    `curves` (C, 3, 4): second to fifth coefficient in X, Y, Z, mm, the parameter going from 0 to 1.
+    `curves` (C, 3, 4): second to fifth coefficient in X, Y, Z, mm, the parameter going from 0 to 1;
+    `splines` (C,), or none: number of the clamped cubic with equal knots of which the block states a control point instead,
+    -1 for none.
     `files`: their names, and the lines that stand before each; empty for one file. `feed_parts`: what an inch
     per minute is in units of F. `feed_kept`: F counts in the units before its block, and keeps them.
     """
@@ -148,10 +150,11 @@ class Canonical:
     feed_parts: float = 1.0
     feed_kept: bool = False
     curves: Floats = field(default_factory=lambda: np.zeros((0, 3, 4)))
+    splines: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     def without(self, letters: tuple[str, ...]) -> Canonical:
         """The same without the words of some letters."""
-        return replace(self, words=self.words.take(~np.isin(self.words.letter, [ord(letter) for letter in letters])))
+        return replace(self, words=self.words.take(~among(self.words.letter, [ord(letter) for letter in letters])))
 
 
 def placed(found: list[Diagnostic], files: Files) -> list[Diagnostic]:

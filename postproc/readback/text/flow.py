@@ -61,7 +61,7 @@ def expand(texts: list[ProgramText], structures: list[Structure],
     statements = tuple(s for t in texts for s in t.statements)
     before = np.cumsum([0, *(len(t.statements) for t in texts)])
     rows = np.cumsum([0, *(t.words.lines for t in texts)])
-    parts, lines, at = [], [np.zeros(1, dtype=np.int64)], 0
+    parts, lines, at = [_slice(texts[0].words, 1, 0, 0, 0)], [np.zeros(1, dtype=np.int64)], 0
     for k, first, last in spans:
         parts.append(_slice(texts[k].words, first, last, at, int(before[k])))
         lines.append(np.arange(first, last + 1) + int(rows[k]))

@@ -160,7 +160,14 @@ def test_report_has_its_units_in_its_keys(name: str, few: None) -> None:
     assert set(found["workspace_mm"]) == set("xyz")
 
 
-@pytest.mark.parametrize("name", machines.names())
+ALIKE = frozenset({"delta-coplanar", "delta-parallel-x-compact", "delta-parallel-z", "delta-parallel-z-compact",
+                   "delta-perpendicular", "delta-star", "linuxcnc-lineardelta", "triaglide", "hexaslide-coplanar",
+                   "hexaslide-parallel-z", "linuxcnc-xyzbc-trt", "mikron-ucp710"})
+"""machines whose kind and number of axes another one has: they differ in figures"""
+
+
+@pytest.mark.parametrize("name", [pytest.param(one, marks=pytest.mark.slow) if one in ALIKE else one
+                                  for one in machines.names()])
 def test_every_machine_is_analysed(name: str, few: None) -> None:
     """Unlimited axes included; the box is there for all that reach their middle with the tool as at home."""
     found = analyse(machines.load(name))

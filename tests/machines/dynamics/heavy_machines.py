@@ -24,7 +24,8 @@ def heavy(name: str, seed: int = 0) -> Machine:
     m, rng = machines.load(name), np.random.default_rng(seed)
     parts, axes = m.kinematics.leg_parts, dict[str, AxisMassModel]()
     for j, letter in enumerate(m.axis_names):
-        keys = {"mass": float(rng.uniform(5, 50)), "rotor": float(rng.uniform(0, 2))}
+        keys = {"mass": float(rng.uniform(5, 50)), "rotor": float(rng.uniform(0, 2)),
+                "friction": float(rng.uniform(0, 90)), "viscous": float(rng.uniform(0, 400))}
         if parts is not None and j in parts.legs_at:
             k = parts.legs_at.tolist().index(j)
             keys |= {"rods": float(rng.uniform(1, 20)), "joint": float(rng.uniform(0, 5))}
@@ -37,9 +38,11 @@ def heavy(name: str, seed: int = 0) -> Machine:
     platform = head = None
     if parts is not None:
         platform = BodyModel(mass=70.0, centre=(20.0, -30.0, 50.0), inertia=(1.2, 1.5, 1.1))
-        if parts.axis is not None and parts.axis.at_spindle:
+        if any(axis.at_spindle for axis in parts.axes):
             head = BodyModel(mass=20.0, centre=(10.0, 20.0, -60.0), inertia=(0.5, 0.6, 0.7))
-    return replace(m, dynamics=DynamicsModel(platform=platform, head=head, axes=axes))
+    part = BodyModel(mass=40.0, centre=(60.0, -20.0, 90.0), inertia=(0.3, 0.4, 0.35))
+    tool = BodyModel(mass=6.0, centre=(2.0, 1.0, -80.0), inertia=(0.02, 0.02, 0.01))
+    return replace(m, dynamics=DynamicsModel(platform=platform, head=head, part=part, tool=tool, axes=axes))
 
 
 def _place(v: Floats) -> MassCentre:
@@ -60,7 +63,7 @@ class Points:
 
     def _chain(self, q: Floats) -> list[tuple[float, Floats]]:
         m, found = self.machine, list[tuple[float, Floats]]()
-        assert m.dynamics is not None
+        assert m.dynamics is not None and m.dynamics.part is not None and m.dynamics.tool is not None
         primed = [token[0] for token in m.structure.split() if token.endswith("'")]
         chain = {joint.name: joint for joint in m.kinematics.chain}
         for names, sense in (([n for n in chain if n in primed][::-1], -1.0), ([n for n in chain if n not in primed], 1.0)):
@@ -70,12 +73,18 @@ class Points:
                 table = m.dynamics.axes[name]
                 centre = np.array(chain[name].point if table.centre is None else table.centre)
                 found += [(mass, move(x)) for mass, x in _rigid(table.mass, centre, table.inertia)]
+            if names:
+                found += [(mass, move(x)) for mass, x in (_of(m.dynamics.part, np.zeros(3)) if sense < 0.0 else _of(
+                    m.dynamics.tool, m.kinematics.forward(np.zeros((1, len(q))))[0][0]))]
         return found
 
     def platform(self, q: Floats) -> tuple[Floats, Rotation]:
         """MassCentre and turn of the platform by its loops alone."""
         k = self.machine.kinematics
         legs = getattr(k, "on_legs", k)
+        if legs.loops.holds is not None:
+            place, turns = legs.platform_pose(q[None, :legs.joints])
+            return place[0] - q[legs.carriers_at] @ legs.carriers, Rotation.from_matrix(turns[0])
         own, free = q[legs.legs_at], [("x", "y", "z", "a", "b", "c").index(f) for f in legs.loops.freedoms]
         feet, spans = self._feet(own), legs.loops.drives.lengths + legs.loops.drives.stretch * own
         place0, turn0, _ = legs.home
@@ -138,16 +147,32 @@ class Points:
         found = [(mass, x + shift) for mass, x in found]
         for i, j in enumerate(parts.carriers_at):
             found.append((model.axes[m.axis_names[j]].mass, q[parts.carriers_at[:i + 1]] @ parts.carriers[:i + 1]))
-        if (axis := parts.axis) is not None and axis.at_spindle:
-            assert model.head is not None
-            about = Rotation.from_rotvec(q[-1] * axis.direction)
-            found += [(mass, place + turn.apply(about.apply(x - axis.point) + axis.point)) for mass, x in
-                      _rigid(model.head.mass, np.array(model.head.centre), model.head.inertia)]
-        elif axis is not None:
-            table = model.axes[axis.name]
-            about = Rotation.from_rotvec(-q[-1] * axis.direction)
-            found += [(mass, about.apply(x)) for mass, x in _rigid(table.mass, np.array(table.centre), table.inertia)]
-        return found
+        return found + self._next_to(q, place, turn)
+
+    def _next_to(self, q: Floats, place: Floats, turn: Rotation) -> list[tuple[float, Floats]]:
+        """Rotary axes, part and tool of a platform on legs."""
+        parts, model = self.machine.kinematics.leg_parts, self.machine.dynamics
+        assert parts is not None and model is not None and model.part is not None and model.tool is not None
+        found, ends = list[tuple[float, Floats]](), dict[bool, Callable[[Floats], Floats]]()
+        for spindle, start in ((False, _stay), (True, lambda x: place + turn.apply(x))):
+            move, axes = start, [axis for axis in parts.axes if axis.at_spindle == spindle]
+            for axis in axes:
+                move = _then(move, Joint(axis.name, True, axis.direction, axis.point), q[axis.at] * (1 if spindle else -1))
+                table = model.axes[axis.name]
+                found += [(mass, move(x)) for mass, x in _rigid(table.mass, np.array(table.centre), table.inertia)]
+            if spindle and axes and model.head is not None:
+                found += [(mass, move(x)) for mass, x in _of(model.head, np.zeros(3))]
+            ends[spindle] = move
+        under = [i for i, j in enumerate(parts.carriers_at) if model.axes[self.machine.axis_names[j]].under_part]
+        if ends[False] is not _stay:
+            found += [(mass, ends[False](x)) for mass, x in _of(model.part, np.zeros(3))]
+        assert not under
+        shift = q[parts.carriers_at] @ parts.carriers if len(parts.carriers_at) else np.zeros(3)
+        return found + [(mass, ends[True](x) + shift) for mass, x in _of(model.tool, parts.gauge)]
+
+
+def _of(model: BodyModel, point: Floats) -> list[tuple[float, Floats]]:
+    return _rigid(model.mass, np.array(model.centre) + point, model.inertia)
 
 
 def _stay(x: Floats) -> Floats:

@@ -50,7 +50,8 @@ def test_parts_add_up_to_the_motion_of_exact_joints() -> None:
     found = forces_at(m, MotionAsked(tip, UP, v, a, np.array([100.0, 50.0, -400.0]), 0.0))
     h, inverse = 1e-4, m.kinematics.inverse
     before, here, after = (inverse((tip + s * h * v + 0.5 * (s * h) ** 2 * a)[None], UP[None])[0] for s in (-1.0, 0.0, 1.0))
-    motion = needed(m).forces(here, (after - before) / (2.0 * h), (after - 2.0 * here + before) / h**2)[0]
+    rate, faster = (after - before) / (2.0 * h), (after - 2.0 * here + before) / h**2
+    motion = needed(m).forces(here, rate, faster)[0] + needed(m).drives.resisting(rate, faster)[0]
     push = -1e3 * np.array([100.0, 50.0, -400.0]) @ m.kinematics.jacobian(here)[0, :3]
     together = np.array([row["together"] for row in found["force_n_or_n_m"].values()])
     np.testing.assert_allclose(together, (motion + push) * 1e-3, rtol=0.0, atol=1e-4 * np.abs(together).max())

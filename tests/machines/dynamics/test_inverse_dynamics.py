@@ -18,8 +18,8 @@ from tests.machines.dynamics.heavy_machines import Points, heavy
 from toolpaths.arrays import Floats
 
 OF_LEGS = ["uranesx", "rotary-delta", "hexapod", "h4a-c-table", "h4a-spindle-axis", "h4-rotary", "planar-delta-z",
-           "macro-micro"]
-OF_CHAINS = ["mill-3axis", "mikron-ucp710", "fork-head-ab", "head-table", "nutating-head"]
+           "macro-micro", "tripod-head", "tricept", "linear-delta-ac", "tilting-arms-c-table"]
+OF_CHAINS = ["mill-3axis", "mill-4axis", "mikron-ucp710", "fork-head-ab", "head-table", "nutating-head"]
 
 
 def waves(m: Machine, t: Floats) -> tuple[Floats, Floats, Floats]:

@@ -7,6 +7,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from machines.geometric_error.actual.actual import approach
+from machines.geometric_error.tables import curve_banks
 from machines.geometric_error.tables.curve_banks import banks
 from machines.geometric_error.tables.curves import FINEST, Curve, Fourier, Polynomial, TableCurve
 
@@ -93,6 +94,23 @@ def test_curves_of_one_basis_are_evaluated_together_as_one_by_one() -> None:
         for numbers, bank in found:
             expected = [curves[k].at(at, direction) for k in numbers]
             np.testing.assert_allclose(bank.at(at, direction), expected, rtol=0.0, atol=1e-13)
+
+
+@pytest.mark.numeric
+@pytest.mark.parametrize(("both", "period"), [(False, 0.0), (True, 0.0), (False, 1.8), (True, 1.8)])
+def test_tables_have_the_same_bits_in_one_loop_over_positions(both: bool, period: float,
+                                                              monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(5)
+    x, at = np.append(-0.9, np.sort(rng.uniform(-0.8, 0.8, 6))), rng.uniform(-1.5, 1.5, 60)
+    at[:10] = [*x, -0.9 + 1.8, np.nan, np.nextafter(x[3], -1.0)]
+    course = rng.uniform(-1.2, 1.2, 60)
+    (_, bank), = banks([TableCurve(x, rng.normal(size=14 if both else 7), both=both, period=period) for _ in range(3)])
+    for direction in (course, 0.0):
+        by_loop = []
+        for wanted in (False, True):
+            monkeypatch.setattr(curve_banks, "wanted", lambda *_, found=wanted: found)
+            by_loop.append(bank.at(at, direction))
+        np.testing.assert_array_equal(*by_loop)
 
 
 def test_rows_of_one_place_ask_for_no_closer_look() -> None:

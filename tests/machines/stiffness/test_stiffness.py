@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ from scipy.optimize import minimize
 from typer.testing import CliRunner
 
 import machines
+from machines.dynamics.yielding import drive_moves
+from machines.dynamics_models import AxisMassModel, BodyModel, DynamicsModel, StiffnessModel
 from machines.stiffness.statics import Springs, compliance, drive_forces, force_rows, rod_forces, tip_stiffness
 from machines.tolerances.influence import middle_of, poses_over
 from machines.tolerances.report import rods_of
@@ -104,3 +107,23 @@ def test_the_command_gives_figures_and_a_map(tmp_path: Path) -> None:
     assert found["drive_force_n"]["largest"] != 0.0 and figure.read_text("utf-8").startswith("<?xml")
     assert run.invoke(app, ["machine", "stiffness", "uranesx", "--rod", "100", "--force", "1,2"]).exit_code == 2
     assert "sensitivity.legs" in run.invoke(app, ["machine", "stiffness", "mill-3axis", "--rod", "1"]).stderr
+
+
+def test_drives_yield_under_part_and_tool_and_where_friction_reverses() -> None:
+    """A trunnion with a part off its axis: the table turns by m g r / k, the head's slide sinks by its weight over its own
+    k; twice the friction over k where an axis reverses."""
+    m, g = machines.load("mikron-ucp710"), 9.80665
+    axes = {name: AxisMassModel(friction=100.0 if name == "Z" else 0.0) for name in m.axis_names}
+    model = DynamicsModel(part=BodyModel(mass=50.0, centre=(0.0, 200.0, 0.0)), tool=BodyModel(mass=8.0), axes=axes)
+    m = replace(m, dynamics=model, stiffness=StiffnessModel(drive=40.0, turn=2.0))
+    q = np.zeros((1, len(m.axis_names)))
+    found = drive_moves(m, m.kinematics, q)
+    assert found is not None
+    line = next(joint for joint in m.kinematics.chain if joint.name == "A")
+    arm = 200.0 - line.point[1]
+    turn = 50.0 * g * arm * 1e-3 / 2.0e3 * (line.direction @ [1.0, 0.0, 0.0])
+    tip = m.kinematics.jacobian(q)[0, :3]
+    a, z = m.axis_names.index("A"), m.axis_names.index("Z")
+    weighed = np.abs(found[0][0] + tip[:, z] * 8.0 * g / 40e3)
+    np.testing.assert_allclose(weighed, np.abs(tip[:, a] * turn), atol=1e-12)
+    assert found[1][0] == pytest.approx(2.0 * 100.0 / 40e3)

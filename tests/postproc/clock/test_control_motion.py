@@ -99,8 +99,8 @@ def test_how_far_points_of_a_curve_stand_apart_changes_little() -> None:
 
 
 def test_a_corner_costs_what_logs_of_a_sinumerik_show() -> None:
-    """35 ms at F720, 15 ms at F350, passed within 0.01 mm; the machine's jerk is not known: 40 m/s3."""
-    settings = replace(LIMITS, acceleration=np.full(2, 5000.0), jerk=np.full(2, 40_000.0), cycle=0.001)
+    """35 ms at F720, 15 ms at F350, passed within 0.01 mm; the machine's jerk is not known: 32 m/s3."""
+    settings = replace(LIMITS, acceleration=np.full(2, 5000.0), jerk=np.full(2, 32_000.0), cycle=0.001)
     bent, straight = np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 20.0]]), np.array([[0.0, 0.0], [20.0, 0.0], [40.0, 0.0]])
     lost = [execute(commanded(bent, 0.01, f / 60.0), settings).seconds - execute(
         commanded(straight, 0.01, f / 60.0), settings).seconds for f in (720.0, 350.0)]
@@ -140,7 +140,7 @@ def test_corners_stay_within_the_tolerance() -> None:
     q = np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 15.0], [30.0, 25.0]])
     path = blended(commanded(q, tolerance=0.02))
     off = np.linalg.norm(path.q[:, None] - q[None, 1:3], axis=2).min(axis=0)
-    assert (off <= 0.02).all() and (off > 0.005).all()
+    assert (off <= 0.02 + 1e-9).all() and (off > 0.01).all()
 
 
 def test_one_line_is_rest_to_rest() -> None:

@@ -101,7 +101,7 @@ def test_the_blocks_are_the_spline(controller: str, units: str) -> None:
 def test_programs_for_a_control_without_are_refused(controller: str) -> None:
     made = converted(controller)
     assert made.job is not None
-    for option in ("", "splines = false"):
+    for option in ("", "splines = false", 'splines = "bspline"'):
         other = replace(made.job, machine=shop(option))
         assert "verify.option" in {d.code for d in read_back(made.text, other, "part.cls")[1]}
     assert codes(made, made.text) == set()

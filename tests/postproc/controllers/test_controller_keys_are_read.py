@@ -34,7 +34,8 @@ OTHERS = {"kinematics.rapids", "kinematics.blends_unstated", "kinematics.exact_p
           "kinematics.smoothing_fixed", "kinematics.axis_smoothing_share", "tools.preload",
           "tools.length_automatic", "tools.cutting_edges", "program.operation",
           "program.carried_out", "program.suffix",
-          "splines.word", "splines.decimals", "program.relies_on_turns", "program.stock",
+          "splines.word", "splines.decimals", "splines.control_points", "splines.interval", "splines.relies_on",
+          "program.relies_on_turns", "program.stock",
           "program.exact_path", "program.smoothing_option", "program.without_smoothing", "arcs.helical_option",
           "cycles.rigid_option", "cycles.floating", "cycles.falling", "cycles.falling_relies_on",
           "codes.tool_by_name", "tools.names",
@@ -46,7 +47,8 @@ OTHERS = {"kinematics.rapids", "kinematics.blends_unstated", "kinematics.exact_p
 """keys of what LinuxCNC, or a machine without modulo axes, has not: test_controllers_*.py,
 test_compensated_arcs.py, test_contour_words.py, test_parts.py, test_rollover.py, test_inch_output.py,
 test_smoothing_levels.py, test_options.py, test_hooks_refused.py, test_output_quality.py, test_align.py,
-test_cycle_time_program.py, test_batch_tasks.py, test_cubic_blocks.py, test_tools_and_feeds_unstated.py
+test_cycle_time_program.py, test_batch_tasks.py, test_cubic_blocks.py, test_control_points.py,
+test_tools_and_feeds_unstated.py
 and test_output_modes*.py show what they do"""
 READ_BACK = {"cycles.peck_relief", "cycles.plane_at_start", "arcs.helix_by_angle"}
 """how the control moves inside a canned cycle, which the read-back follows and no block states, and what rounding moves"""

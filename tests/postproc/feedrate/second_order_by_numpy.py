@@ -11,44 +11,54 @@ from toolpaths.arrays import Bools, Floats
 
 
 class _Rows(NamedTuple):
-    """|a x0 + b x1| <= 1 with b >= 0, (R,) each: one interval, R = 2J; or (N - 1, R)."""
+    """-down <= a x0 + b x1 <= up with b >= 0, (R,) each: one interval, R = 2J; or (N - 1, R)."""
 
     a: Floats
     b: Floats
+    up: Floats
+    down: Floats
+
+    def at(self, i: int, which: Bools | slice = slice(None)) -> _Rows:
+        """Of one interval, those that are asked for."""
+        return _Rows(*(part[i, which] for part in self))
 
 
-def _rows(h: Floats, dq: Floats, d2q: Floats) -> _Rows:
-    """Rows of all intervals (N - 1, 2J); dq, d2q (N, J) over the limits."""
+def _rows(h: Floats, dq: Floats, d2q: Floats, middle: Floats) -> _Rows:
+    """Rows of all intervals (N - 1, 2J); dq, d2q (N, J) over the limits, middle (N, J) added to them."""
     half = (0.5 / h)[:, None]
     here, there = dq[:-1] * half, dq[1:] * half
     a, b = np.concatenate((d2q[:-1] - here, -there), axis=1), np.concatenate((here, d2q[1:] + there), axis=1)
-    return _Rows(np.where(b < 0.0, -a, a), np.abs(b))
+    own = np.concatenate((middle[:-1], middle[1:]), axis=1)
+    turned = b < 0.0
+    return _Rows(np.where(turned, -a, a), np.abs(b), np.where(turned, 1.0 + own, 1.0 - own),
+                 np.where(turned, 1.0 - own, 1.0 + own))
 
 
-def sweep(h: Floats, dq: Floats, d2q: Floats, x: Floats, flat: float) -> None:
+def sweep(h: Floats, dq: Floats, d2q: Floats, middle: Floats, x: Floats, flat: float) -> None:
     """Both passes with numpy, one interval at a time; `x` holds the bound, then the result."""
-    rows, counts = _rows(h, dq, d2q), np.empty((len(h), 2 * dq.shape[1]), dtype=bool)
+    rows, counts = _rows(h, dq, d2q, np.broadcast_to(middle, dq.shape)), np.empty((len(h), 2 * dq.shape[1]), dtype=bool)
     with np.errstate(over="ignore", divide="ignore"):
         for i in range(len(h) - 1, -1, -1):
-            counts[i], x0 = _alone(rows.a[i], rows.b[i], x[i], x[i + 1], flat)
-            x[i] = _largest_start(_Rows(rows.a[i, counts[i]], rows.b[i, counts[i]]), x0, x[i + 1])
+            counts[i], x0 = _alone(rows.at(i), x[i], x[i + 1], flat)
+            x[i] = _largest_start(rows.at(i, counts[i]), x0, x[i + 1])
     for i in range(len(h)):
-        x[i + 1] = _largest_next(_Rows(rows.a[i, counts[i]], rows.b[i, counts[i]]), x[i], x[i + 1])
+        x[i + 1] = _largest_next(rows.at(i, counts[i]), x[i], x[i + 1])
 
 
-def _alone(a: Floats, b: Floats, x0: float, cap: float, flat: float) -> tuple[Bools, float]:
+def _alone(rows: _Rows, x0: float, cap: float, flat: float) -> tuple[Bools, float]:
     """(R,) the rows in which x1 counts, and x0 with what the others leave of it."""
-    size = np.abs(a)
-    x0 = min(x0, float(((1.0 + b * cap) / size).min()))
-    reach = min(cap, float(((1.0 + size * x0) / b).min()))
+    a, b, up, down = rows
+    size, wide = np.abs(a), np.maximum(up, down)
+    x0 = min(x0, float(((wide + b * cap) / size).min()))
+    reach = min(cap, float(((wide + size * x0) / b).min()))
     counts = b * reach > flat
-    return counts, min(x0, float(((1.0 - b * reach) / size)[~counts].min(initial=np.inf)))
+    return counts, min(x0, float(((np.where(a > 0.0, up, down) - b * reach) / size)[~counts].min(initial=np.inf)))
 
 
 def _interval(rows: _Rows, x0: float, cap: float) -> tuple[float, float, int, int]:
     """l(x0), u(x0) and the rows they are of, -1 for 0 and for the cap."""
     over, used = 1.0 / rows.b, rows.a * x0
-    low, high = np.append(0.0, (-1.0 - used) * over), np.append(cap, (1.0 - used) * over)
+    low, high = np.append(0.0, (-rows.down - used) * over), np.append(cap, (rows.up - used) * over)
     i, j = int(np.argmax(low)), int(np.argmin(high))
     return float(low[i]), float(high[j]), i - 1, j - 1
 

@@ -95,7 +95,7 @@ def test_the_set_up_says_where_the_program_begins() -> None:
 
 def test_rewinds_with_the_feeds_of_a_plan() -> None:
     """A planned pass ends where the tool is drawn back; the program is read back as ever."""
-    result = run(cone(2.5, 5.0), limited("mikron-ucp710", "C", -400, 400), feed="planned")
+    result = run(cone(2.5, 15.0), limited("mikron-ucp710", "C", -400, 400), feed="planned")
     assert len(result.path.rewinds) == 1
 
 

@@ -252,7 +252,7 @@ class Forgetful:
     """A Delta that takes the other mode for the home mode at some joints, as a machine with two such modes could."""
 
     def __init__(self, kin: OnLegs, at: int) -> None:
-        self.kin, self.at, self.rotary, self.drives_tip = kin, at, kin.rotary, kin.drives_tip
+        self.kin, self.at, self.rotary, self.in_loops = kin, at, kin.rotary, kin.in_loops
 
     def forward(self, q: np.ndarray, near: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         tip, axis = self.kin.forward(q, near)

@@ -96,7 +96,7 @@ def test_a_walk_ends_where_the_machine_cannot_follow(far: float) -> None:
     given = kin.forward
 
     class Counted:
-        rotary, drives_tip, carried = kin.rotary, kin.drives_tip, staticmethod(kin.carried)
+        rotary, in_loops, carried = kin.rotary, kin.in_loops, staticmethod(kin.carried)
 
         def forward(self, q: np.ndarray, near: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
             nonlocal count

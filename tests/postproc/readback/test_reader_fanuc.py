@@ -226,3 +226,9 @@ def test_modes_need_a_machine_that_has_them() -> None:
 def test_machine_moves_inside_a_mode_are_refused(dialect: str, on: str, off: str) -> None:
     text = program(f"T1 M6\n{on}\nG53 G0 Z400.\n{off}\n")
     assert faults(dialect, text, "mikron-ucp710") == {"gcode.machine_position": [7]}
+
+
+@pytest.mark.parametrize("text", ["O24 O24 O24\n", "O24\nO25\nM99\n", "%\nO1\n%\n", ""])
+@pytest.mark.parametrize("dialect", [FANUC, HAAS])
+def test_a_text_of_nothing_but_program_numbers_is_refused(dialect: str, text: str) -> None:
+    assert {"gcode.no_end"} <= set(faults(dialect, text))

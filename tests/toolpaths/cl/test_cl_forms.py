@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from toolpaths.cl.forms import FORMS
 from toolpaths.cl.interpret import HANDLERS
 from toolpaths.cl.read import ReadResult, read_bytes
 from toolpaths.cl.text.near import one_edit
@@ -124,3 +125,11 @@ def test_cycles_of_catia_by_other_words(words: str, like: str) -> None:
     a, b = cycle(words), cycle(like)
     assert (a.kind, a.depth, a.clearance, a.retract, a.steps, a.dwell, a.feed, a.feed_mode) == (
         b.kind, b.depth, b.clearance, b.retract, b.steps, b.dwell, b.feed, b.feed_mode)
+
+
+@pytest.mark.parametrize("before", ["OPFEATSTART/ HOLES ", "OPNAME/A "])
+def test_a_name_may_end_with_the_bare_word_of_any_record(before: str) -> None:
+    for word in FORMS:
+        for behind in ("", "/", " ,"):
+            read = read_bytes(f"{before}{word}{behind}\nGOTO/1,2,3\n".encode())
+            assert has_errors(read.diagnostics) or len(read.toolpath) == 1, word

@@ -76,11 +76,13 @@ def _read(c: Bytes, starts: Ints, ends: Ints, head: bytes, tail: bytes,
     """(lines (K,) of the form whose numbers are none beyond `largest`, their numbers)."""
     good = _begin_with(c, starts, ends, head) & _end_with(c, starts, ends, tail)
     good &= ends - starts - len(head) - len(tail) <= _LONGEST
-    first, low, high = int(starts[0]), starts + len(head), ends - len(tail)
-    window = c[first:int(ends[-1]) + 1]
-    strange = np.flatnonzero(~_DIGITS[window]) + first
-    good &= (high > low) & (np.searchsorted(strange, low) == np.searchsorted(strange, high))
-    numbers = _numbers(window, low[good] - first, high[good] - first)
+    low, high = starts + len(head), ends - len(tail)
+    good &= high > low
+    rows = np.flatnonzero(good)
+    if len(rows):
+        strange = ~_DIGITS[_characters(c, low[rows], high[rows])]
+        good[rows] = ~np.logical_or.reduceat(strange, _begins(low[rows], high[rows]))
+    numbers = _numbers(c, low[good], high[good])
     if numbers is None:
         return np.zeros(len(starts), dtype=np.bool_), np.zeros(0)
     small = np.abs(numbers) <= largest
@@ -104,13 +106,23 @@ def _end_with(c: Bytes, starts: Ints, ends: Ints, text: bytes) -> Bools:
     return result
 
 
+def _begins(low: Ints, high: Ints) -> Ints:
+    """(K,) where the characters of low..high begin when they stand one behind the other."""
+    return np.asarray(np.cumsum(high - low) - (high - low))
+
+
+def _characters(c: Bytes, low: Ints, high: Ints) -> Bytes:
+    """The characters of low..high (K,) one behind the other: of few lines in a long file these alone are looked at."""
+    shift = np.repeat(low - _begins(low, high), high - low)
+    return np.asarray(c[shift + np.arange(len(shift))])
+
+
 def _numbers(c: Bytes, low: Ints, high: Ints) -> Floats | None:
     """Numbers (K,) that stand at low..high, correctly rounded; None where one is none."""
-    inside = np.zeros(len(c) + 2, np.int8)
-    inside[low] = 1
-    inside[high + 1] -= 1
-    text = np.append(c, np.uint8(10))[np.cumsum(inside[:-1], dtype=np.int8).view(bool)]
-    text[np.cumsum(high + 1 - low) - 1] = ord(",")
+    text = np.full(int((high - low).sum()) + len(low), ord(","), np.uint8)
+    own = np.ones(len(text), dtype=np.bool_)
+    own[np.cumsum(high + 1 - low) - 1] = False
+    text[own] = _characters(c, low, high)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:

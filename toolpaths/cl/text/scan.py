@@ -156,6 +156,8 @@ def _uncommented(c: Bytes) -> Bytes:
     line, first = np.unique(np.searchsorted(ends, marks), return_index=True)
     starts = _inked(c, np.where(line > 0, ends[line - 1] + 1, 0))
     good = _begins_goto(c, starts)
+    if not good.any():
+        return c
     edge = np.zeros(len(c), np.int8)
     edge[marks[first[good]]] = 1
     edge[ends[line[good]]] = -1
