@@ -9,8 +9,6 @@ adjusted as F.3.4 says by the lengths of the rods that together make the tool ri
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from machines.geometric_error.actual.actual import Actual
@@ -24,6 +22,7 @@ from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from machines.tolerances.sensitivity import DimensionPart, LegDimension
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 GRID, TURNS, LOOKS = (5, 5, 3, 3), 4, 400

@@ -162,16 +162,17 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
                         **{f"--residuals {name}": str(name) for name in fields}},
                        inputs := {"the CL file": str(file), "the set-up": setup, "the hooks": hooks,
                                   "the error model": error_model, **own_files(machine, controller)})
-    from postproc.cycle_time.conversion import estimate_of, program_clock
-    from postproc.pipeline.convert import convert as run
     from postproc.proof import command
-    from postproc.report import summary
-    from postproc.writing.program_files import program_files
 
     outputs: dict[Path, str | bytes] = {}
     with shown_errors(json), progress_bar() as progress:
         known = command.hashed(machine, controller, options) if proof or page else None
         m, spec = machine_of(machine), controller_of(controller)
+        from postproc.cycle_time.conversion import estimate_of, program_clock  # a misspelt name is said before all this
+        from postproc.pipeline.convert import convert as run
+        from postproc.report import summary
+        from postproc.writing.program_files import program_files
+
         path, found = read_cl(file, options, progress, options.tolerance)
         result = run(path, m, spec, options=options, diagnostics=found, progress=progress,
                      clock=program_clock(model))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.cl.spline_chords import DEGREE, de_boor, knots_of
 from toolpaths.cl.uniform_splines import equal_knots
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 _PLACES = np.arange(DEGREE + 1) / DEGREE

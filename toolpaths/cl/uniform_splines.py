@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from toolpaths.arrays import Floats, Ints
 from toolpaths.cl.spline_chords import DEGREE, chord_errors, chord_places, de_boor, knots_of
+from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
 FIT = 0.75

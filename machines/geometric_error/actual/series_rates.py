@@ -8,7 +8,6 @@ more than it is off.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from machines.geometric_error.actual.error_rates import LARGEST_TURN, AxisSizes,
 from machines.geometric_error.actual.rod_rates import ToolRates
 from machines.geometric_error.actual.serial_errors import SerialErrors
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 from toolpaths.rotations import lengths, rotation
 from toolpaths.shapes import arrays
 
