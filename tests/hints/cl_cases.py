@@ -76,6 +76,7 @@ _ROWS = [  # code, records as found, as the hint has them, word of the hint
     ("cl.tool-number", "LOAD/TOOL", "LOAD/TOOL,3", "LOAD/TOOL,3"),
     ("cl.tool-number", "TURRET/FACE", "TURRET/3", "TURRET/3"),
     ("cl.units", "UNITS/CM", "UNITS/MM", "UNITS/MM"),
+    ("cl.turning", "THREAD/TURN,AT,1.5\nGOTO/10,5,0", "GOTO/10,5,0", "take turning operations out"),
     ("cl.from", "GOHOME/,1,2", "GOHOME/0,1,2", "GOHOME/x,y,z"),
     (
         "cl.circle-times",

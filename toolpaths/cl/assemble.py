@@ -153,6 +153,11 @@ def _check_world_axes(b: ToolpathBuilder, rows: PointRows) -> None:
             b.log.error("cl.tlaxis", f"TLAXIS states the tool axis ({stated[0]:.6g}, {stated[1]:.6g}, {stated[2]:.6g}), by "
                         f"ROTABL it is ({i:.6g}, {j:.6g}, {k:.6g}): it cannot be known where the points are", line,
                         "write the file again in the CAM system")
+    stated_at = {row for row, _, _ in b.world_axes}
+    unstated = [line for row, line in b.turned_lines.items() if row < len(rows) and row not in stated_at]
+    b.log.many(Severity.ERROR, "cl.tlaxis", "ROTABL turns the frame of the points behind it, and no TLAXIS stands between "
+               "them and the points before: from where it turns cannot be known", np.array(unstated, np.int64),
+               "write TLAXIS/i,j,k before these ROTABL, or the file again in the CAM system")
 
 
 def _checked_axis(b: ToolpathBuilder, rows: PointRows) -> Floats:

@@ -156,6 +156,8 @@ class ToolpathBuilder:
         self.table = [0.0, 0.0, 0.0]
         self.turned_at = 0
         """row at which ROTABL has last turned the frame of the points"""
+        self.turned_lines: dict[int, int] = {}
+        """line of the last ROTABL that turns the frame of the points by row, where TLAXIS begins with it upright"""
         self.turned: Floats = np.eye(3)
         self.table_turn: Floats = np.eye(3)
         """turned machine to part, by ROTATE alone (Creo)"""

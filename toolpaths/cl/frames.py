@@ -246,6 +246,8 @@ def _turn(b: ToolpathBuilder, axis: int, angle: float, incremental: bool) -> Non
     elif step != 0.0:
         b.turned, b.turned_at = b.turned @ rotation(np.eye(3)[axis], np.array([step]))[0], b.row
         refresh(b)
+        if b.dialect.tlaxis_upright:
+            b.turned_lines[b.row] = b.line
     if b.dialect.frame_turns:
         use_world_axis(b)
 

@@ -7,6 +7,8 @@ from dataclasses import field, replace
 from difflib import get_close_matches
 from pathlib import Path
 
+import numpy as np
+
 from toolpaths.choices import CubicPieces, DialectName, LengthUnit, ShopName
 from toolpaths.cl.assemble import assemble
 from toolpaths.cl.build import ToolpathBuilder
@@ -121,16 +123,28 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
     records = counted(b, frozenset(HANDLERS))
     if _no_apt_text(b, records):
         return _refused(file, "no line of it is a record of APT text, and it is no form of a CAM system that is read", APT)
-    turning = [op.turning for op in toolpath.operations]
-    if any(turning) and has_errors(log.diagnostics()):
-        whole = "this is a turning file" if all(turning) else "turning stands between milling"
-        log.info("cl.turning", f"{whole}: milling alone is converted")
-    diagnostics = log.diagnostics()
+    diagnostics = _of_turning([op.turning for op in toolpath.operations], log)
     read = replace(_with_faults(toolpath, diagnostics), records=records)
     source = ClSource(raw, units or "", built_in or "") if shop is None else shop.source(raw, units)
     object.__setattr__(read, "source", source)
     return ReadResult(read, diagnostics, counts, found.name, said.evidence,
                       b.arc_records, b.cycle_records, said.lines)
+
+
+def _of_turning(turning: list[bool], log: DiagnosticLog) -> list[Diagnostic]:
+    """What is said of a file: where all of it is turning and not all of it can be read, that alone, for it is not
+    converted whatever its records are; where some of it is, that besides."""
+    found = log.diagnostics()
+    if not any(turning) or not has_errors(found):
+        return found
+    if not all(turning):
+        log.info("cl.turning", "turning stands between milling: milling alone is converted")
+        return log.diagnostics()
+    own = DiagnosticLog(log.file)
+    lines = sorted({line for d in found if d.severity is Severity.ERROR for line in d.lines})
+    own.many(Severity.ERROR, "cl.turning", "this is a turning file: milling alone is converted",
+             np.array(lines or [0], np.int64), "take turning operations out of the CL file")
+    return [*own.diagnostics(), *(d for d in found if d.severity is Severity.INFO)]
 
 
 def _said(raw: bytes, dialect: DialectName | None, shop: ShopText | None, log: DiagnosticLog,

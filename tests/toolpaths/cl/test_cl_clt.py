@@ -80,6 +80,16 @@ def test_a_frame_that_is_not_turned_back_is_refused_and_read_by_tlaxis() -> None
     assert seen.tip == pytest.approx(right.tip, abs=1e-4) and seen.known.all() and not seen.unread
 
 
+def test_by_tlaxis_an_operation_that_turns_without_tlaxis_is_refused() -> None:
+    """Its ROTABL would be added to those of the operation before, which nothing has turned back."""
+    turned, points = (math.pi / 2, 0.0, 0.0), "GOTO/ 1.0,2.0,30.0 \n"
+    for angle, axis in ((-math.pi / 2, "0.0,1.0,0.0"), (0.5, "0.0,-0.479426,0.877583")):
+        text = HEAD + unclosed(feature("0.0,-1.0,0.0", turned, points) + feature(axis, (angle, 0.0, 0.0), points)) + "FINI\n"
+        assert not [d for d in read_bytes(text, dialect="tlaxis").diagnostics if d.severity is Severity.ERROR]
+        found = read_bytes(text.replace(f"TLAXIS/ {axis} \n", ""), dialect="tlaxis").diagnostics
+        assert [(d.code, d.lines) for d in found if d.severity is Severity.ERROR] == [("cl.tlaxis", (12,))]
+
+
 def test_a_tool_axis_without_a_turned_table_holds_as_it_stands() -> None:
     p = read(feature("0.0,-1.0,0.0", (0.0, 0.0, 0.0), "GOTO/ 1.0,2.0,3.0 \n")).toolpath
     assert (p.tip[0].tolist(), p.axis[0].tolist()) == ([1, 2, 3], [0, -1, 0])

@@ -97,12 +97,13 @@ def test_no_cl_file_is_taken_for_another_form() -> None:
     "UNITS/MM\nFEDRAT/0.2,MMPR\nGOTO/50,5,0\nTHREAD/TURN,AT,1.5\nGOTO/10,5,0\nFINI\n",
     "UNITS/MM\nTOOL PATH/FACE,TOOL,OD\nTLDATA/TURN,POINT,80.0,0.8\nTURRET/FACE,1\nGOTO/9,5,0\nEND-OF-PATH\nFINI\n"])
 def test_turning_is_turning_whatever_else_is_wrong(text: str) -> None:
-    """Where records are refused the note says so in their place, as nothing is converted then."""
+    """Where records are refused one line says so in their place, as nothing is converted whatever they are."""
     path, found = toolpaths.read_bytes(text.encode())
     assert all(op.turning for op in path.operations) and path.operations
     refused = any(d.severity.name == "ERROR" for d in found)
     assert [d.message for d in found if d.code == "cl.turning"] == (
         ["this is a turning file: milling alone is converted"] if refused else [])
+    assert [d.code for d in found if d.severity.name != "INFO"] == ["cl.turning"] or not refused
 
 
 @pytest.mark.parametrize(("said", "turning"), [
