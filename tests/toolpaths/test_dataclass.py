@@ -111,6 +111,15 @@ def test_the_first_values_are_made_as_the_later_ones_are() -> None:
     assert pickle.loads(pickle.dumps(made)) == made and len({Plain(1, (2,)) == Plain(1, (2,)), True}) == 1
 
 
+def test_fields_may_have_any_name_and_are_given_by_it() -> None:
+    """Also the names that methods of these classes have for their own arguments."""
+    names = {"value": 1, "args": 2, "given": 3, "owner": 4, "cls": 5, "fields": 6, "calls": 7, "field": 8}
+    for make in MAKERS:
+        named = make(frozen=True)(type("Named", (), {"__annotations__": dict.fromkeys(names, "int")}))
+        for _ in range(COMPILED_FROM + 2):
+            assert vars(dataclasses.replace(named(**names), value=9)) == names | {"value": 9}
+
+
 def test_a_class_with_methods_of_its_own_keeps_them() -> None:
     @dataclass(frozen=True)
     class Own:
