@@ -159,7 +159,7 @@ class LegDynamics(Dynamics):
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(drives="N K", wrench="N 6", total="N 3")
+@arrays(drives="N K", wrench="N 6", total="N 3", head="*N")
 class PlatformLoads:
     """What a motion asks for.
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from toolpaths.dataclass import dataclass
 
 FloatArray = NDArray[np.float64]
 EPS = 4.0 * float(np.finfo(np.float64).eps)

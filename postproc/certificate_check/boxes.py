@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.certificate_check.balls import FloatArray
-from toolpaths.dataclass import dataclass
 
 
 class Rejected(ValueError):

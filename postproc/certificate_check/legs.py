@@ -7,12 +7,12 @@ axis is (sin t cos h, sin t sin h, cos t), the turn the least one that takes z t
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from postproc.certificate_check.balls import Ball, FloatArray, ball, cos_sin, scalar, vector
-from toolpaths.dataclass import dataclass
 
 Vectors = list[Ball]
 """three components"""

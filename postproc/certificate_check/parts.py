@@ -9,13 +9,13 @@ II.4.2; separating planes, Boyd and Vandenberghe, Convex Optimization, 2.5.1.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from postproc.certificate_check.balls import Ball, FloatArray, ball, scalar
 from postproc.certificate_check.legs import Bounds, Vectors, carried
-from toolpaths.dataclass import dataclass
 
 ONE_JOINT = 1e-6
 """mm: platform ends of rods nearer than this are one joint"""

@@ -22,7 +22,7 @@ CHANGE = 0.12
 
 
 @dataclass(frozen=True)
-@arrays(dq="J K", d2q="J K", d3q="J K", cap="K", capped="K", weight="K", tight="2 K", shortest="K")
+@arrays(dq="J K", d2q="J K", d3q="J K", cap="K", capped="K", weight="K", tight="2 K", shortest="K", middle="J K")
 class SpeedProblem:
     """Minimise sum w x^-1/2 over coefficients of x, K knots, J joints.
 

@@ -25,7 +25,8 @@ AT_ONCE = {
     "machines/geometric_error/actual/actual_chain_loop.py", "machines/geometric_error/actual/rods.py",
     "machines/geometric_error/tables/curve_banks.py",
     "machines/kinematics/chain_loop.py", "postproc/collision/search.py",
-    "postproc/feedrate/interior_packed.py", "postproc/feedrate/paths.py", "postproc/feedrate/tightening.py",
+    "postproc/feedrate/interior_packed.py", "postproc/feedrate/paths.py", "postproc/feedrate/profile.py",
+    "postproc/feedrate/slowdown.py", "postproc/feedrate/tightening.py",
     "postproc/path/coarse_bound.py", "postproc/readback/execution/frames_loop.py", "postproc/readback/text/word_loop.py",
     "postproc/writing/block_text.py", "toolpaths/cl/text/goto_loop.py", "toolpaths/smoothing/sweep.py",
 }
@@ -36,7 +37,8 @@ actual_chain_loop.py 39 times (25 ms for 0.65), curve_banks.py 41 times (300 pos
 0.9 ms for 0.02), search.py 15 times
 (5 moves: 2.7 s for 0.18), interior_packed.py 45 to 68 times (256 knots: 0.6 s for 0.013), paths.py 118 to 130 times,
 tightening.py 23 to 31 times, sweep.py 35 times; goto_loop.py, word_loop.py and block_text.py go
-through characters one by one, some hundred times; coarse_bound.py is asked of long curves alone. `numeric` tests compare
+through characters one by one, some hundred times; coarse_bound.py is asked of long curves alone, profile.py of many
+times at once, slowdown.py where the planner's other loops are compiled already. `numeric` tests compare
 both forms."""
 BY_ARGUMENT = {"postproc/feedrate/second_order.py", "postproc/orientation/candidates/ranking.py"}
 """The caller says whether to compile, for several loops together."""
