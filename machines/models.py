@@ -186,8 +186,8 @@ class ControlModel(UserModel):
     """the option of helical interpolation; false: helices are written as lines"""
     splines: bool | SplineBlocks | None = None
     """the option of spline interpolation (Siemens POLY, iTNC 530 SPL): true or "poly" writes splines of the CL file by it,
-    one block for each cubic; "bspline" by control points (Siemens BSPLINE; arcs and chords on controls without it); default:
-    they are arcs and chords, and a program with such blocks is refused"""
+    one block for each cubic; "bspline" by control points (Siemens BSPLINE); a control without them gets arcs and chords,
+    and a warning; default: they are arcs and chords, and a program with such blocks is refused"""
     tip_frame: Literal["table", "entry"] | None = None
     """what X, Y, Z are the tip in, where a rotary table stands turned when tool-centre-point control is switched on (Fanuc
     parameter 19696#5 WKP); default: as the controller file has it ([modes.tcp] frame)"""

@@ -20,7 +20,7 @@ from postproc.job.job import prepare, with_shop
 from postproc.pipeline.feeds_by_clock import ProgramClock, with_compared_feeds
 from postproc.pipeline.free_spin import with_spin_needed
 from postproc.pipeline.hooks import refused_hooks
-from postproc.pipeline.native_splines import as_arcs, asked_splines, held_near, with_cubics
+from postproc.pipeline.native_splines import as_arcs, asked_splines, held_near, never_cubics, with_cubics
 from postproc.pipeline.next_modes import with_next_modes
 from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.pipeline.smoothed_stages import ExcludedPasses, with_passes_taken_back
@@ -65,7 +65,10 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
     spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
     found = _reading(path, diagnostics)
     kind: CubicPieces = "uniform" if machine.options.control_points else "pieces"
-    native = with_cubics(path, options, kind) if asked_splines(path, machine, spec, options) else path
+    asked = asked_splines(path, machine)
+    if asked and (never := never_cubics(path, machine, spec, options)) is not None:
+        found, asked = (*found, never), False
+    native = with_cubics(path, options, kind) if asked else path
     made = _converted(_begun(native, machine, controller, spec, setup, options, found), progress, clock)
     held = made.ok and made.program is not None and len(made.program.curves) > 0
     if held or native is path:

@@ -12,7 +12,7 @@ from postproc.controllers.model import ControllerFile
 from toolpaths.choices import CubicPieces, ShopName
 from toolpaths.cl.curves import SPLINE_SHARE
 from toolpaths.cl.read import read_bytes
-from toolpaths.diagnostics import Diagnostic, Severity, warning
+from toolpaths.diagnostics import Diagnostic, Severity, info, warning
 from toolpaths.toolpath import Toolpath
 
 _SHIFTED = ("CUTCOM",)
@@ -20,14 +20,29 @@ _BEFORE = rb"^[ \t/]*(?:N?\d+)?[ \t/]*(?:G\d+[ \t]+)*"
 """what stands before the word of such a block"""
 
 
-def asked_splines(path: Toolpath, machine: Machine, controller: ControllerFile, options: Options) -> bool:
-    """True where splines of a path may be written as cubics: the machine file says that the option is fitted, points are
-    written as they stand, and no radius compensation shifts them."""
-    word = controller.splines.control_points if machine.options.control_points else controller.splines.word
-    if not machine.options.confirmed("splines") or not word or not path.spline_slack:
-        return False
-    return not (options.smooth or options.error_model or options.feed == "planned" or options.feed_mode == "inverse-time"
-                or any(event.word in _SHIFTED for event in path.events))
+def asked_splines(path: Toolpath, machine: Machine) -> bool:
+    """True where a path has splines and the machine file says that the option to run them is fitted."""
+    return machine.options.confirmed("splines") and path.spline_slack > 0.0
+
+
+def never_cubics(path: Toolpath, machine: Machine, controller: ControllerFile, options: Options) -> Diagnostic | None:
+    """Why no block runs a spline though it is asked for: the control has no word for it, points are not written as they
+    stand, or radius compensation shifts them; None where blocks may."""
+    rules, points = controller.splines, machine.options.control_points
+    if points and rules.word and not rules.control_points:
+        return warning("splines.no_word", "splines are written as arcs and chords: this controller file has no block for "
+                       f"their control points, it has {rules.word}", file=path.file,
+                       hint='state splines = "poly" under [control] of the machine file')
+    if not rules.word:
+        return warning("splines.no_word", "splines are written as arcs and chords: this controller file has no block for "
+                       "them ([splines])", file=path.file,
+                       hint="nothing is to be done: splines = false under [control] of the machine file leaves this out")
+    reasons = {"with --smooth": options.smooth, "with an error model": bool(options.error_model),
+               "with --feed planned": options.feed == "planned", "with inverse time": options.feed_mode == "inverse-time",
+               "under CUTCOM": any(event.word in _SHIFTED for event in path.events)}
+    why = next((name for name, holds in reasons.items() if holds), "")
+    return info("splines.kept", f"splines are written as arcs and chords: {why} no block of the control runs them",
+                file=path.file) if why else None
 
 
 def held_splines(data: bytes, controller: ControllerFile) -> CubicPieces:

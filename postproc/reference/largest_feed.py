@@ -42,7 +42,7 @@ def limited_feeds(moves: Moves, toolpath: Toolpath, largest: float) -> tuple[Mov
                              f"to {largest / PER_MINUTE:g} mm/min, the largest cutting feed ([control] "
                              "largest_feed)", file=toolpath.file, lines=np.unique(moves.line[rows])[:6].tolist(),
                              count=len(rows),
-                             hint="nothing is to be done: the program is written and proved with the limited feed"))
+                             hint="nothing is to be done: programs state the limited feed and are compared with it"))
     feed, seconds = moves.feed.copy(), moves.seconds.copy()
     feed[rows] = np.where(np.isfinite(feed[rows]), np.minimum(feed[rows], largest), feed[rows])
     seconds[rows] = np.where(seconds[rows] > 0.0, moves.lengths()[rows] / largest, seconds[rows])

@@ -255,6 +255,15 @@ _OUTPUT = [
         machine="h4-rotary",
     ),
     convert(
+        "splines.no_word",
+        START + "RAPID\nGOTO/0,0,5\nGOTO/0,0,0\nNURBS/\nKNOT/1.0\nCNTRL/5,9,0\nCNTRL/9,-4,0\nCNTRL/12,0,0\n"
+        "RAPID\nGOTO/12,0,5\n",
+        r'state (splines = "poly")',
+        Edit("m.toml", 'splines = "bspline"', r"\1"),
+        control="heidenhain-tnc640",
+        m='base = "mill-3axis"\n[control]\nsplines = "bspline"\n',
+    ),
+    convert(
         "output.longest",
         "UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nCUTCOM/LEFT,1\n"
         + "".join(f"RAPID\nGOTO/{x},0,5\nFEDRAT/200,MMPM\nGOTO/{x},0,0\nGOTO/{x},9,0\n" for x in range(6))

@@ -217,6 +217,15 @@ def test_what_is_refused_as_blocks_is_written_as_arcs(monkeypatch: pytest.Monkey
     assert made.ok and "splines.as_arcs" in {d.code for d in made.diagnostics} and not BLOCK[SIEMENS].search(made.text)
 
 
+@pytest.mark.parametrize(("controller", "option", "text", "code"), [
+    (TNC, 'splines = "bspline"', FILE, "splines.no_word"), ("fanuc-30i", "splines = true", FILE, "splines.no_word"),
+    (SIEMENS, "splines = true", FILE.replace("NURBS/", "CUTCOM/LEFT,1\nGOTO/10,0,-3.5\nNURBS/"), "splines.kept"),
+    (TNC, "splines = false", FILE, ""), (TNC, "splines = true", FILE.partition("NURBS/")[0], "")])
+def test_splines_that_are_asked_for_are_not_arcs_without_a_word(controller: str, option: str, text: str, code: str) -> None:
+    found = {d.code for d in converted(controller, option, text=text).diagnostics}
+    assert {c for c in found if c.startswith("splines.")} == ({code} if code else set())
+
+
 MORE = "OPSKIP/OFF\nNURBS/\nKNOT/1.0\nCNTRL/15,9,-3\nCNTRL/16,-4,-3\nCNTRL/18,-9,-4\nRAPID\nGOTO/12,-9"
 SKIPPED = FILE.replace("NURBS/", "OPSKIP/ON\nNURBS/").replace("RAPID\nGOTO/12,-9", MORE)
 
