@@ -137,7 +137,7 @@ def main() -> int:
         for number, python in enumerate(given.python or [sys.executable]):
             began, place = time.monotonic(), folder / f"{FOLDER} {number}"
             place.mkdir()
-            own = installed(python, wheel, place, given.extras)
+            own = installed(str(Path(shutil.which(python) or python).absolute()), wheel, place, given.extras)
             faults = smoke(own, source, place)
             bad += len(faults)
             said = "not run" if given.no_tests else tested(own, source, place, tuple(given.tests or TESTS))

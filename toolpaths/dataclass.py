@@ -109,6 +109,7 @@ def _initialiser(cls: type) -> Callable[..., None]:
     given = {False: list[str](), True: list[str]()}
     names: dict[str, Any] = {"_put": object.__setattr__, "_factory": _FACTORY}
     body = list[str]()
+    own = "__dataclass_self__" if any(f.name == "self" for f in fields) else "self"
     for f in fields:
         made = f.default_factory is not MISSING
         names[f"_default_{f.name}"] = f.default_factory if made else f.default
@@ -118,10 +119,10 @@ def _initialiser(cls: type) -> Callable[..., None]:
         if f.init:
             given[f.kw_only is True].append(f.name + default)
         if f.init or made:
-            body.append(f" _put(self, {f.name!r}, {value})")
+            body.append(f" _put({own}, {f.name!r}, {value})")
     if hasattr(cls, "__post_init__"):
-        body.append(" self.__post_init__()")
-    head = ", ".join(["self", *given[False], *(["*", *given[True]] if given[True] else [])])
+        body.append(f" {own}.__post_init__()")
+    head = ", ".join([own, *given[False], *(["*", *given[True]] if given[True] else [])])
     exec(f"def __init__({head}):\n" + ("\n".join(body) or " pass"), names)
     method: Callable[..., None] = names["__init__"]
     method.__annotations__ = {f.name: f.type for f in fields if f.init} | {"return": None}

@@ -29,6 +29,8 @@ line of an axis, where a drive or an axis counts from"""
 PARTS: tuple[DimensionPart, ...] = ("drive", "guide", "foot", "joint", "rod")
 AXES = {"drive": "xyz", "guide": "abc", "foot": "tnu", "joint": "xyz", "rod": ""}
 """directions: of the machine; turns about them; tangential, inwards, along the guide; of the platform"""
+TURNS = frozenset((*"abc", "turn"))
+"""directions of angles; those of a guide are angles too"""
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class LegDimension:
     @property
     def angular(self) -> bool:
         """True where its error is a turn, in rad."""
-        return self.part == "guide" or self.axis in ("a", "b", "c", "turn")
+        return self.part == "guide" or self.axis in TURNS
 
 
 @dataclass(frozen=True, eq=False)

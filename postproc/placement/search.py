@@ -5,7 +5,7 @@ Places that travel rules out are never planned, nor are those whose bound is not
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from postproc.placement.reasons import Obstacle, SmallTable
 from postproc.placement.region import Region, region_of
 from postproc.placement.space import ANGLES, FINE, Space
 from toolpaths.arrays import Floats
+from toolpaths.dataclass import dataclass
 from toolpaths.units import DEG
 
 EQUAL = 2e-4

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from postproc.readback.comparison.length_margins import MUCH
 from toolpaths.arrays import Floats, Ints
+from toolpaths.dataclass import dataclass
 
 SIGNS = -1.0, 1.0
 """shorter, longer"""

@@ -111,6 +111,16 @@ def test_the_first_values_are_made_as_the_later_ones_are() -> None:
     assert pickle.loads(pickle.dumps(made)) == made and len({Plain(1, (2,)) == Plain(1, (2,)), True}) == 1
 
 
+def test_fields_have_any_name() -> None:
+    """Also those of the arguments of what makes the values, before `__init__` is compiled and behind."""
+    for name in ("value", "self", "owner", "args", "given", "cls", "fields"):
+        for make in MAKERS:
+            cls = make(frozen=True)(type("Named", (), {"__annotations__": {name: int, "second": int}}))
+            for k in range(COMPILED_FROM + 2):
+                first = dataclasses.replace(cls(**{name: k, "second": 2}), second=3)
+                assert (getattr(first, name), first.second) == (k, 3)
+
+
 def test_a_class_with_methods_of_its_own_keeps_them() -> None:
     @dataclass(frozen=True)
     class Own:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 from unicodedata import category
+
+from toolpaths.dataclass import dataclass
 
 
 @dataclass

@@ -71,7 +71,7 @@ class FanucMacros:
         self.blocks = Blocks(held, False, sources.read[0].name)
         self.levels: list[Level] = []
         self.modal: ModalCall | None = None
-        self.plane = PlaneWords(self.blocks.track)
+        self.plane = PlaneWords(self.blocks, haas)
         self.variables = Variables(self.blocks, held)
         self.expressions = Expressions(FANUC, self.variable, self._unknown)
         self.words_of: dict[str, list[Word]] = {}
