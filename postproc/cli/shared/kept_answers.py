@@ -45,7 +45,7 @@ class KeptAnswers:
         write_together({self.file: "".join(f"{one}\n" for one in answers)})
         several = f"{len(answers)} answers are" if len(answers) > 1 else "1 answer is"
         SAYS.interrupted = (f"interrupted; {several} kept in {self.file}, one a line: the same command goes on from "
-                            "there; correct a line to answer otherwise, delete the file to begin anew")
+                            "there; correct a line to answer otherwise, delete the file to begin again")
         return SAYS.interrupted
 
 
