@@ -26,7 +26,7 @@ from toolpaths.diagnostics import Diagnostic, Severity, has_errors
 
 ENDLESS = "endless"
 ALSO_ENDLESS = "unlimited", "continuous"
-"""words of machine files and brochures for it, which an answer may hold too"""
+"""words of machine files and brochures for it, which a sheet or an answer may hold too"""
 NAME = "sheet"
 """what the document is called in [sources] of the machine file"""
 _ACCELERATION, _TURNING_ACCELERATION = 2000.0, 500.0
@@ -240,11 +240,16 @@ def _axis(making: _Making, letter: str, axis: AxisSheet, rotary: bool) -> None:
         making.assume((*at, "home"), min(max(0.0, travel[0]), travel[1]), (letter,))
 
 
+def says_endless(text: str) -> bool:
+    """True where a travel has no ends."""
+    return any(word in text.lower() for word in (ENDLESS, *ALSO_ENDLESS))
+
+
 def _travel(making: _Making, letter: str, axis: AxisSheet, rotary: bool) -> tuple[float, float] | None:
     """Both ends, mm or degrees."""
     measure: QuantityKind = "angle" if rotary else "length"
     path = (letter, "travel")
-    if axis.travel == ENDLESS:
+    if isinstance(axis.travel, str) and says_endless(axis.travel):
         if not rotary:
             making.fault(path, f"{letter}.travel: a linear axis has ends", 'write its length, "762 mm"')
             return None

@@ -8,7 +8,7 @@ from dataclasses import field
 from typing import get_args
 
 from machines.sheet.jog import QUESTIONS
-from machines.sheet.make import ALSO_ENDLESS, ENDLESS
+from machines.sheet.make import ENDLESS, says_endless
 from machines.sheet.model import PivotForm, ZeroEnd, spelt
 from machines.sheet.pivots import names_of
 from machines.sheet.quantity import QuantityKind, angles_of, read_quantity
@@ -126,7 +126,7 @@ def _slide(sheet: _Sheet, letter: str) -> Iterator[str]:
 
 def _turn(sheet: _Sheet, letter: str, in_table: bool) -> Iterator[str]:
     def ends(text: str) -> str:
-        if any(word in text.lower() for word in (ENDLESS, *ALSO_ENDLESS)):
+        if says_endless(text):
             return json.dumps(ENDLESS)
         both = angles_of(text)
         if both is None:

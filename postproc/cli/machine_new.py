@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from postproc.cli.shared.console import Json, refuse_overwriting, report, shown_errors
-from postproc.cli.shared.says import answer_line
 
 if TYPE_CHECKING:
     from machines.machine import Machine
     from machines.sheet.make import NewMachine
     from machines.sheet.questions import SheetQuestion
+    from postproc.cli.shared.kept_answers import KeptAnswers
 
 EXAMPLES = """Example: postproc machine new shop.sheet.toml -o shop.toml --drawing shop.svg
 
 The sheet holds the figures of a brochure with their units, the pivot numbers of the control by its own names, and what was
 seen when each rotary axis was jogged. Where there is no such file, its questions are asked on the terminal, and it is
-written. All faults of a sheet come at once, each with its line; what the sheet states is not assumed."""
+written; Ctrl-C keeps the answers, and the same command goes on. All faults of a sheet come at once, each with its line;
+what the sheet states is not assumed."""
 
 
 def machine_new(sheet: Annotated[Path, typer.Argument(metavar="SHEET.toml", help="data sheet; where it is not there it is "
@@ -53,31 +55,44 @@ def machine_new(sheet: Annotated[Path, typer.Argument(metavar="SHEET.toml", help
 
 
 def _asked(sheet: Path) -> bool:
-    """The sheet, written from the answers; where they end too soon it is not."""
+    """The sheet, written from the answers; where they end too soon it is not. What was answered on a terminal is kept."""
     from machines.sheet.questions import sheet_text
+    from postproc.cli.shared.kept_answers import kept_answers
     from toolpaths.diagnostics import DiagnosticError, error
     from toolpaths.transaction import write_together
 
+    kept = kept_answers(sheet.with_name(f"{sheet.name}.answers"))
     try:
-        write_together({sheet: sheet_text(_ask)})
+        write_together({sheet: sheet_text(lambda question: _ask(question, kept))})
+    except KeyboardInterrupt:
+        kept.keep()
+        raise
     except EOFError:
+        if sys.stdin is not None and sys.stdin.isatty() and kept.keep():
+            raise KeyboardInterrupt from None
         raise DiagnosticError([error("sheet.unanswered", f"the answers ended before {sheet} was whole; nothing was written",
                                      hint=f"answer on a terminal, or write {sheet} and name it again")]) from None
+    kept.file.unlink(missing_ok=True)
     return True
 
 
-def _ask(question: SheetQuestion) -> str:
+def _ask(question: SheetQuestion, kept: KeptAnswers) -> str:
     """Asks until an answer fits.
 
     Raises:
         EOFError: where standard input has ended.
     """
+    again = False
     while True:
-        line = answer_line(question.prompt())
+        line = kept.line(question.prompt(), again)
         try:
-            return question.parsed(line)
+            answer = question.parsed(line)
         except ValueError as wrong:
             typer.echo(str(wrong), err=True)
+            again = True
+        else:
+            kept.given.append(line.strip())
+            return answer
 
 
 def _text(made: NewMachine, output: Path, drawing: str) -> str:

@@ -26,7 +26,7 @@ from postproc.cli.shared.options import (
     ToleranceOption,
     UnitsOption,
 )
-from postproc.cli.shared.says import answer_line
+from postproc.cli.shared.says import SAYS, answer_line
 
 if TYPE_CHECKING:
     from postproc.base.options import Options
@@ -105,6 +105,9 @@ def _made(file: Path, machine: str, controller: str, options: Options, given: Gi
             options = replace(options, units="inch" if asked(units_question()) == "inch" else "mm")
             path, found = read_cl(file, options)
         sheet = new_setup(path, m, controller, options, given, None if yes else asked, yes, found, code, progress)
+    except KeyboardInterrupt:
+        SAYS.interrupted = asked.to_go_on()
+        raise
     except EOFError:
         sheet = new_setup(path, m, controller, options, asked.added(given), None, False, found, code, progress)
     own = tuple(question for question, _ in asked.done if question.kind == "units")
@@ -133,6 +136,12 @@ class _Asking:
                 self.done.append((question, value))
                 return value
             typer.echo(wrong, err=True)
+
+    def to_go_on(self) -> str:
+        """What is said of an interruption: the options that hold what was answered; "" where nothing was."""
+        options = " ".join(question.answered_by(value) for question, value in self.done if value != "")
+        return f"interrupted; nothing was written; the same command with these options goes on from there: {options}" \
+            if options else ""
 
     def added(self, given: GivenAnswers) -> GivenAnswers:
         """The options of the command line with what was answered before standard input ended."""

@@ -77,6 +77,11 @@ class Question:
         value = words.get(self.kind) or {"mm": "MM", "rev/min": "RPM"}.get(self.unit, "MM/MIN")
         return f"{_OPTIONS[self.kind]} {f'{self.number}=' if self.number else ''}{value}"
 
+    def answered_by(self, value: float | str) -> str:
+        """The option with an answer."""
+        key = f"{self.name}=" if self.name else f"{self.number}=" if self.number else ""
+        return f"{_OPTIONS[self.kind]} {shlex.quote(key + (f'{value:.10g}' if isinstance(value, float) else value))}"
+
     def prompt(self) -> str:
         """What stands before the answer."""
         offered = f"{self.default:g}" if isinstance(self.default, float) else self.default

@@ -270,6 +270,13 @@ def test_pivots_of_each_control() -> None:
     np.testing.assert_allclose([points["B"], points["C"]], [b, b])
 
 
+def test_a_rotary_axis_without_ends_by_the_words_of_brochures_and_machine_files(tmp_path: Path) -> None:
+    """"unlimited" is the word of machine files, and was refused in a sheet."""
+    texts = [made(tmp_path, old='travel = "endless"', new=f'travel = "{word}"').text for word in (
+        "endless", "unlimited", "Continuous")]
+    assert texts[0] and len(set(texts)) == 1
+
+
 def test_quantities() -> None:
     assert read_quantity("50 rpm", "turning speed") == 300.0 and read_quantity('30 "', "length") == 762.0
     with pytest.raises(WrongFigureError, match="no unit"):

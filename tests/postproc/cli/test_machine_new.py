@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from pathlib import Path
@@ -11,6 +12,7 @@ from typer.testing import CliRunner, Result
 
 import machines
 from postproc.cli.app import app
+from postproc.cli.shared.guard import INTERRUPTED, guarded
 from tests.machines.sheet.test_sheet import TRUNNION
 from tests.postproc.pipeline.test_machines_of_the_catalogue import PART, TILTED
 
@@ -45,6 +47,28 @@ def test_the_questions_make_the_sheet_and_the_machine(folder: Path) -> None:
         (j.name, j.point.tolist(), j.direction.tolist()) for j in typed.kinematics.chain if j.rotary]
     assert (asked.largest_spindle_speed, typed.largest_spindle_speed) == (8100.0, math.inf)
     assert (asked.limits.lower == typed.limits.lower).all() and (asked.limits.velocity == typed.limits.velocity).all()
+
+
+def test_an_interruption_keeps_the_answers_and_the_same_command_goes_on(folder: Path,
+                                                                        monkeypatch: pytest.MonkeyPatch) -> None:
+    """Twenty answers and Ctrl-C: they were lost."""
+    class Interrupted(io.StringIO):
+        def readline(self, *_: object) -> str:
+            line = super().readline()
+            if not line:
+                raise KeyboardInterrupt
+            return line
+
+    kept, words = Path("s.toml.answers"), ["machine", "new", "s.toml", "-o", "m.toml"]
+    for begin, end in ((0, 3), (3, 8), (8, 20)):
+        monkeypatch.setattr("sys.stdin", Interrupted("\n".join(ANSWERS[begin:end]) + "\n"))
+        monkeypatch.setattr("sys.argv", ["postproc", *words])
+        assert guarded(app) == INTERRUPTED and list(folder.iterdir()) == [folder / kept]
+    assert kept.read_text().splitlines() == [one for one in ANSWERS[:20] if one != "762"]
+    kept.write_text(kept.read_text().replace("762 mm", "762"))  # does not fit: this one is asked for, the others stand
+    assert run(*words, answers="\n".join(["762 mm", *ANSWERS[20:]]) + "\n").exit_code == 0
+    assert sorted(p.name for p in folder.iterdir()) == ["m.toml", "s.toml"]
+    assert machines.load("m.toml").largest_spindle_speed == 8100.0
 
 
 def test_answers_that_end_too_soon_write_nothing(folder: Path) -> None:

@@ -23,6 +23,7 @@ import postproc
 import toolpaths
 from postproc.base.options import Options
 from postproc.cli.app import app
+from postproc.cli.shared.guard import INTERRUPTED, guarded
 from postproc.cli.shared.says import answer_line as LINE
 from postproc.controllers.model import load_controller
 from postproc.setup.model import load_setup, part_placement
@@ -176,6 +177,28 @@ def test_questions_are_asked_and_answered(tmp_path: Path) -> None:
     assert run(*words, "--yes", code=2).stderr and out.read_text() == before, "no file is replaced without --force"
     run(*words, "--yes", "--force", "--feed", "70")
     assert tomllib.loads(out.read_text())["output"]["feed"] == 70 and out.read_text() != before
+
+
+def test_an_interruption_says_the_options_that_hold_the_answers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                                capsys: pytest.CaptureFixture[str]) -> None:
+    """Ctrl-C behind some answers: they were lost."""
+    words = ["setup", "new", str(bare(tmp_path)), "-m", "head-table", "-c", "fanuc-30i", "-o", str(tmp_path / "s.toml")]
+    lines = iter(["7\n", "\n", "8000\n"])
+
+    def answer(_: str) -> str:
+        line = next(lines, None)
+        if line is None:
+            raise KeyboardInterrupt
+        return line
+
+    monkeypatch.setattr("postproc.cli.setup_new.answer_line", answer)
+    monkeypatch.setattr("sys.argv", ["postproc", *words])
+    assert guarded(app) == INTERRUPTED and not (tmp_path / "s.toml").exists()
+    options = capsys.readouterr().err.rpartition("goes on from there: ")[2].split()
+    assert options == ["--tool-number", "EM10=7", "--spindle", "7=8000"]
+    monkeypatch.undo()
+    run(*words, *options, stdin="\n350\nflood\n\n")
+    assert "7" in tomllib.loads((tmp_path / "s.toml").read_text())["tools"]
 
 
 def test_numbers_of_tools_are_answers(tmp_path: Path) -> None:

@@ -72,7 +72,7 @@ def test_what_systems_write_is_taken(line: str) -> None:
     ("generic MULTAX/XN", "cl.form"), ("generic CLEARP/(PLANE/0,0,1)", "cl.form"), ("generic DELETE/ONN", "cl.form"),
     ("generic CUTCOM/NORMP", "cl.form"), ("generic GOCLER/1,2,3", "cl.unknown-motion"), ("generic RESET", "cl.unknown-word"),
     ("generic COUPLE/AUTO", "cl.unknown-word"), ("generic POSTN/1", "cl.unknown-word"),
-    ("generic THREAD/LEAD,2.0", "cl.unsupported-motion")])
+    ("generic THREAD/LEAD,2.0", "cl.turning")])
 def test_what_is_left_of_a_record_or_changes_the_motion_is_refused(line: str, code: str) -> None:
     assert code in errors(read(line))
 
