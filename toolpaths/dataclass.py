@@ -63,7 +63,7 @@ class _FirstCalled:
         method = self.owner.__init__ = _initialiser(self.owner)
         return method
 
-    def _by_names(self, value: Any, *args: object, **given: object) -> None:
+    def _by_names(self, value: Any, /, *args: object, **given: object) -> None:
         """What the compiled one does; where a field is missing, unknown or given twice, it is that one that says so."""
         named = {**dict(zip((field.name for field in self.fields), args, strict=False)), **given}
         for field in self.fields:

@@ -135,3 +135,17 @@ def test_a_frozen_class_derives_from_no_other() -> None:
 
     with pytest.raises(TypeError, match="cannot inherit frozen"):
         dataclass(frozen=True)(type("Frozen", (Loose,), {"__annotations__": {"b": "int"}}))
+
+
+def test_fields_may_have_the_names_of_what_sets_them() -> None:
+    """A hooks file of the shop ended in code 70: a class with a field `value`, given by name."""
+    @dataclass(frozen=True)
+    class Named:
+        value: int
+        owner: int = 2
+        calls: int = 3
+        args: int = 4
+        given: int = 5
+
+    made = [Named(value=one, given=0) for one in range(COMPILED_FROM + 3)]
+    assert [one.value for one in made] == list(range(len(made))) and made[0] == Named(0, 2, 3, 4, 0) != Named(0)
