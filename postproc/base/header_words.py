@@ -158,11 +158,11 @@ _MODEL = pattern(rb"(?im)^[^\n]*" + FINGERPRINT.encode("ascii") + rb" ([0-9a-f]{
 _BY_CONTROL = pattern(rb"(?im)^[^\n]*geometric errors [^\n]*corrected by the control")
 _AXES = pattern(rb"(?im)^[^\n]*tool axes chosen: orient ([a-z-]+), max tilt ([^ \n]+) degrees")
 _CORRECTED_FOLDED = pattern(_BEGINS + _spaced("geometric errors") + _GAP + _NAME + rb":?" + _GAP +
-                               _spaced("corrected in this program"))
+                            _spaced("corrected in this program"))
 _BY_CONTROL_FOLDED = pattern(_BEGINS + _spaced("geometric errors") + _GAP + _NAME + rb":?" + _GAP +
-                                _spaced("corrected by the control"))
+                             _spaced("corrected by the control"))
 _SETUP_FOLDED = pattern(_BEGINS + b"setup" + _GAP + _NAME + b"," + _GAP + _spaced(SETUP_MARK) + _GAP +
-                           rb"([0-9a-f]{8})\b")
+                        rb"([0-9a-f]{8})\b")
 _HOOKS = pattern(_BEGINS + _spaced(HOOKS) + _GAP + rb"([^\n]*)")
 _SETUP = pattern(rb"(?im)^[ \t(;\dN]*setup ([^\n]*?)(?:, " + SETUP_MARK.encode("ascii") + rb" ([0-9a-f]{8})\b|$)")
 _OURS = pattern(rb"(?im)^[^\n]*postproc \d+\.\d[^\n]*\n(?:[^\n]*part [^\n]*\n)?[^\n]*source ")
