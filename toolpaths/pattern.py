@@ -4,7 +4,7 @@ two hundred patterns, 20 ms to compile, and looks for few of them."""
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from re import compile as pattern
@@ -15,7 +15,7 @@ else:
         def __init__(self, text: str | bytes, flags: int = 0) -> None:
             self._asked = text, flags
 
-        def __getattr__(self, name: str) -> Any:
+        def __getattr__(self, name: str) -> object:
             if name.startswith("_"):
                 raise AttributeError(name)
             value = getattr(re.compile(*self._asked), name)
