@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from postproc.base.length_text import SAID, LengthText
 from toolpaths.dataclass import dataclass
+from toolpaths.pattern import pattern
 from toolpaths.units import MM_PER_INCH
 
 NO_FILE = "without a file"
@@ -32,8 +33,8 @@ UNKNOWN = "--------"
 """in their place while the program is written"""
 HEADER, BEGIN = 40_000, 4000
 """characters of a program that hold its header, with a line for each of many places and tools; that hold its first line"""
-_FIRST = re.compile(rb"(?im)^[ \tN\d]*[(;][ \t]*postproc \d")
-_COMMENT = re.compile(rb"(?i)[ \t]*(?:N?\d+[ \t]*)?(?:\([^()\n]*\)|;[^\n]*)?[ \t]*(?:\n|\Z)")
+_FIRST = pattern(rb"(?im)^[ \tN\d]*[(;][ \t]*postproc \d")
+_COMMENT = pattern(rb"(?i)[ \t]*(?:N?\d+[ \t]*)?(?:\([^()\n]*\)|;[^\n]*)?[ \t]*(?:\n|\Z)")
 
 
 def header_of(data: bytes) -> bytes:
@@ -141,7 +142,7 @@ class ProgramHeader:
 
 _GAP = rb"(?:[ \t]+|[ \t]*\)?[ \t]*\n[ \t]*(?:N?\d+[ \t]*)?[(;][ \t]*)"
 """between two words: the end of a comment too, where a line that is longer than a block goes on in the next"""
-_FOLD = re.compile(_GAP)
+_FOLD = pattern(_GAP)
 _BEGINS = rb"(?im)^[ \t(;\dN]*"
 
 
@@ -152,24 +153,24 @@ def _spaced(text: str) -> bytes:
 
 _NAME = rb"([\s\S]{0,500}?)"
 """a name, in one line or several"""
-_CORRECTED = re.compile(rb"(?im)^[^\n]*geometric errors ([^\n]*?):? corrected in this program")
-_MODEL = re.compile(rb"(?im)^[^\n]*" + FINGERPRINT.encode("ascii") + rb" ([0-9a-f]{8})\b")
-_BY_CONTROL = re.compile(rb"(?im)^[^\n]*geometric errors [^\n]*corrected by the control")
-_AXES = re.compile(rb"(?im)^[^\n]*tool axes chosen: orient ([a-z-]+), max tilt ([^ \n]+) degrees")
-_CORRECTED_FOLDED = re.compile(_BEGINS + _spaced("geometric errors") + _GAP + _NAME + rb":?" + _GAP +
-                               _spaced("corrected in this program"))
-_BY_CONTROL_FOLDED = re.compile(_BEGINS + _spaced("geometric errors") + _GAP + _NAME + rb":?" + _GAP +
-                                _spaced("corrected by the control"))
-_SETUP_FOLDED = re.compile(_BEGINS + b"setup" + _GAP + _NAME + b"," + _GAP + _spaced(SETUP_MARK) + _GAP +
-                           rb"([0-9a-f]{8})\b")
-_HOOKS = re.compile(_BEGINS + _spaced(HOOKS) + _GAP + rb"([^\n]*)")
-_SETUP = re.compile(rb"(?im)^[ \t(;\dN]*setup ([^\n]*?)(?:, " + SETUP_MARK.encode("ascii") + rb" ([0-9a-f]{8})\b|$)")
-_OURS = re.compile(rb"(?im)^[^\n]*postproc \d+\.\d[^\n]*\n(?:[^\n]*part [^\n]*\n)?[^\n]*source ")
-_TOLERANCE = re.compile(rb"(?im)^[ \t(;\dN]*tolerance (\d[\d.e-]*) (mm|inch)\b")
-_SMOOTHING = re.compile(rb"(?im)^[ \t(;\dN]*control.{0,3}s smoothing (\d[\d.e-]*) (mm|inch)\b")
-_PLANNED = re.compile(rb"(?im)^[ \t(;\d]*feed planned")
-_FEEDS = re.compile(rb"(?im)^[^\n]*" + FEEDS.encode("ascii") + rb" ([0-9a-f]{8})\b")
-_PLACE = re.compile(f"(?i){FEEDS} {UNKNOWN}")
+_CORRECTED = pattern(rb"(?im)^[^\n]*geometric errors ([^\n]*?):? corrected in this program")
+_MODEL = pattern(rb"(?im)^[^\n]*" + FINGERPRINT.encode("ascii") + rb" ([0-9a-f]{8})\b")
+_BY_CONTROL = pattern(rb"(?im)^[^\n]*geometric errors [^\n]*corrected by the control")
+_AXES = pattern(rb"(?im)^[^\n]*tool axes chosen: orient ([a-z-]+), max tilt ([^ \n]+) degrees")
+_CORRECTED_FOLDED = pattern(_BEGINS + _spaced("geometric errors") + _GAP + _NAME + rb":?" + _GAP +
+                            _spaced("corrected in this program"))
+_BY_CONTROL_FOLDED = pattern(_BEGINS + _spaced("geometric errors") + _GAP + _NAME + rb":?" + _GAP +
+                             _spaced("corrected by the control"))
+_SETUP_FOLDED = pattern(_BEGINS + b"setup" + _GAP + _NAME + b"," + _GAP + _spaced(SETUP_MARK) + _GAP +
+                        rb"([0-9a-f]{8})\b")
+_HOOKS = pattern(_BEGINS + _spaced(HOOKS) + _GAP + rb"([^\n]*)")
+_SETUP = pattern(rb"(?im)^[ \t(;\dN]*setup ([^\n]*?)(?:, " + SETUP_MARK.encode("ascii") + rb" ([0-9a-f]{8})\b|$)")
+_OURS = pattern(rb"(?im)^[^\n]*postproc \d+\.\d[^\n]*\n(?:[^\n]*part [^\n]*\n)?[^\n]*source ")
+_TOLERANCE = pattern(rb"(?im)^[ \t(;\dN]*tolerance (\d[\d.e-]*) (mm|inch)\b")
+_SMOOTHING = pattern(rb"(?im)^[ \t(;\dN]*control.{0,3}s smoothing (\d[\d.e-]*) (mm|inch)\b")
+_PLANNED = pattern(rb"(?im)^[ \t(;\d]*feed planned")
+_FEEDS = pattern(rb"(?im)^[^\n]*" + FEEDS.encode("ascii") + rb" ([0-9a-f]{8})\b")
+_PLACE = pattern(f"(?i){FEEDS} {UNKNOWN}")
 
 
 def read_header(data: bytes) -> ProgramHeader:

@@ -64,6 +64,7 @@ from postproc.cli.shared.options import (
     only_with_errors,
     word_option,
 )
+from postproc.cli.shared.says import SAYS
 from postproc.cli.time import time
 from toolpaths.choices import FieldEnding, GivenDialect, GivenUnit
 
@@ -178,9 +179,10 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
                      clock=program_clock(model))
         noted, why = _fields(result, fields) if fields else ([], [])
         result = replace(result, diagnostics=(*result.diagnostics, *why))
-        time = estimate_of(result, model, executed=bool(page))  # all before a file is written
-        values = summary.as_dict(result, str(output), time)
-        text = summary.as_text(result, str(output), time, values)
+        # all before a file is written; under --quiet nobody asks for times, nor for figures without --json
+        time = estimate_of(result, model, executed=bool(page)) if page or json or model or not SAYS.quiet else None
+        values = summary.as_dict(result, str(output), time) if json or not SAYS.quiet else {}
+        text = "" if SAYS.quiet else summary.as_text(result, str(output), time, values)
         more = [] if result.ok else _offers(result, path, machine, controller)
         shown, of_tabs = pages(page, path, result, known, output.name, time)
         outputs |= shown

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from postproc.base.options import Options
-from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.proof.hashes import Hashes, ProofInput, input_hashes, proof_place
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error, warning
 from toolpaths.input_files import is_regular, reason, shown
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # names are read before what works on results is imported
+    from postproc.pipeline.result import PostResult, VerifyResult
     from postproc.proof.changes import Kept
 
 

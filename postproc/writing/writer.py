@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator
 from itertools import chain
@@ -19,10 +18,11 @@ from postproc.controllers.texts import blocks_of
 from postproc.reference.coolant import COMMANDS
 from postproc.writing.state import NUMBER_ROOM, WriterState, plain_name, without_off
 from toolpaths.arrays import Ints
+from toolpaths.pattern import pattern
 
-_LABEL = re.compile(r"%|[NO]\d")
+_LABEL = pattern(r"%|[NO]\d")
 """blocks that carry a number of their own"""
-_HUNDRED = re.compile(r"N\d+")
+_HUNDRED = pattern(r"N\d+")
 """number of an operation"""
 SKIP = "/"
 """before blocks that a switch at the control leaves out"""

@@ -145,15 +145,3 @@ def test_a_frozen_class_derives_from_no_other() -> None:
 
     with pytest.raises(TypeError, match="cannot inherit frozen"):
         dataclass(frozen=True)(type("Frozen", (Loose,), {"__annotations__": {"b": "int"}}))
-
-
-def test_a_field_may_have_any_name() -> None:
-    """The first values are made by a function of the house, whose own arguments a field named as they are met."""
-    @dataclass(frozen=True)
-    class Named:
-        value: float
-        args: int = 0
-        given: int = 0
-
-    made = Named(value=1.0, args=2, given=3)
-    assert (made.value, made.args, made.given) == (1.0, 2, 3) and dataclasses.replace(made, value=4.0).value == 4.0

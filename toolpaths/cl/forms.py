@@ -21,6 +21,7 @@ from toolpaths.cl.text.statements import COMMENT, DATA_COMMENT, Statement, State
 from toolpaths.cl.text.subprograms import NAME
 from toolpaths.cl.text.words import BARE_WORDS, NEUTRAL, SILENT, TEXT_WORDS
 from toolpaths.dataclass import dataclass
+from toolpaths.pattern import pattern
 
 
 @dataclass(frozen=True)
@@ -104,22 +105,22 @@ _EVERYDAY = frozenset({"LOAD", "END", "STOP", "HEAD", "CHECK", "AIR", "SET", "DE
 _ACTING = tuple(word for word in (*FORMS, "GOTO", "GODLTA", "MCSYS", "TOOLNO", "KNOT", "CNTRL", "TOOL PATH",
                              "TLON *, *GOFWD") if word not in _EVERYDAY and not word.startswith(DATA_COMMENT))
 _RECORD = r"(?:(?<!UN)LOAD|" + "|".join(_ACTING) + r")\s*/"
-_GLUED = re.compile(r"(?:[A-Za-z0-9.)\]%\"';:!?][^A-Za-z0-9\s]?|[-=*#_]{3})(?P<record>" + _RECORD +
+_GLUED = pattern(r"(?:[A-Za-z0-9.)\]%\"';:!?][^A-Za-z0-9\s]?|[-=*#_]{3})(?P<record>" + _RECORD +
                     r"|(?:RAPID|FINI|END-OF-PATH|GOHOME|OPSTOP|MULTAX|ENDSUB|(?<![A-Za-z])(?<![A-Za-z]-)STOP)\s*$)")
-_BEHIND = re.compile(r"\S\s+(?P<record>" + _RECORD + r"\s*[^\s/]+(?:\s*,\s*[^\s/]+)*\s*$)")
+_BEHIND = pattern(r"\S\s+(?P<record>" + _RECORD + r"\s*[^\s/]+(?:\s*,\s*[^\s/]+)*\s*$)")
 _GEOMETRY = frozenset({"PSIS", "SYN"})
 """Words whose parameters hold slashes."""
-_WITHIN = re.compile(_RECORD)
+_WITHIN = pattern(_RECORD)
 _NAMES = frozenset({"$$->FEATNO", "TOOL PATH", "PARTNO", "TPRINT", "OPNAME", "OP_NAME", "CSI_TOOL_PATH", "OPFEATSTART",
                     "MACHIN", "MACHINE", "PROGRAM", "PART_OPE", "CATPROCESS", "CATPRODUCT", "DISPLY"})
 """Words whose parameters are a name or a text, which may hold slashes."""
-_NUMBER_LIKE = re.compile(r"[-+.]*\d[-+.\d]*|[-+.\d]*[eEdD][-+.\d]*\d[-+.\d]*|[-+.]+")
-_PLANE = re.compile(r"\(\s*PLANE\s*/(?:\s*[-+.\d]+\s*,){3}\s*[-+.\d]+\s*\)", re.IGNORECASE)
-_QUOTED = re.compile(r"'[^'/$]*'")
-_ONE_LETTER = re.compile(r"[-+.\d]*[^-+.\d][-+.\d]*")
-_TWO_NUMBERS = re.compile(r"[\d.]\s+[-+.\d]")
+_NUMBER_LIKE = pattern(r"[-+.]*\d[-+.\d]*|[-+.\d]*[eEdD][-+.\d]*\d[-+.\d]*|[-+.]+")
+_PLANE = pattern(r"\(\s*PLANE\s*/(?:\s*[-+.\d]+\s*,){3}\s*[-+.\d]+\s*\)", re.IGNORECASE)
+_QUOTED = pattern(r"'[^'/$]*'")
+_ONE_LETTER = pattern(r"[-+.\d]*[^-+.\d][-+.\d]*")
+_TWO_NUMBERS = pattern(r"[\d.]\s+[-+.\d]")
 _STARTS_NUMBER = frozenset("+-.0123456789")
-_LEADING_ZEROS = re.compile(r"[+-]?(?:0\d+|\.0*)")
+_LEADING_ZEROS = pattern(r"[+-]?(?:0\d+|\.0*)")
 
 
 def check_forms(program: StatementList, log: DiagnosticLog, allowed: Iterable[str], dialect: Dialect) -> None:

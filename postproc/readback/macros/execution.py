@@ -14,6 +14,7 @@ from postproc.readback.text.words import lines_of, plain
 from toolpaths.arrays import Ints
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, has_errors
+from toolpaths.pattern import pattern
 from toolpaths.shapes import arrays
 
 if TYPE_CHECKING:
@@ -42,12 +43,12 @@ _BEGINNINGS: dict[MacroLanguage, tuple[re.Pattern[bytes], ...]] = {
     "fanuc": (re.compile(rb"M0*(?:99[ \t]*P|198)"), re.compile(rb"G0*(?:1[056]|30|31|50|52|92|6[5678])")),
     "linuxcnc": (re.compile(rb"G0*(?:10|28|30|52|92)"), re.compile(rb"O\s*[<\d]"))}
 """one of these stands where `_NEEDED` finds anything: each looked for by its first letter, they are soon absent"""
-_CONTINUED = re.compile(rb"~[ \t]*\n")
+_CONTINUED = pattern(rb"~[ \t]*\n")
 _COMMENT, _STRING = re.compile(rb";[^\n]*"), re.compile(rb'(?<!T=)"[^"\n]*"')
-_SIGNS = re.compile(rb"=[ \t]*[-+]*[ \t]*(?:[A-Z_$(\[]|[\d.]+[ \t]*[-+*/])")
-_POLYNOMIAL = re.compile(rb"(?:\bPO[ \t]*\[[ \t]*[A-Z]?[ \t]*\][ \t]*=|=[ \t]*PO)[ \t]*\([-+.,\dEX \t]*\)")
+_SIGNS = pattern(rb"=[ \t]*[-+]*[ \t]*(?:[A-Z_$(\[]|[\d.]+[ \t]*[-+*/])")
+_POLYNOMIAL = pattern(rb"(?:\bPO[ \t]*\[[ \t]*[A-Z]?[ \t]*\][ \t]*=|=[ \t]*PO)[ \t]*\([-+.,\dEX \t]*\)")
 """polynomials of numbers, which the dialect reads by itself"""
-_PARAMETERS = re.compile(rb"R\d+[ \t]*=")
+_PARAMETERS = pattern(rb"R\d+[ \t]*=")
 _WORDS = (b"DEF", b"IF", b"GOTO", b"FOR", b"WHILE", b"REPEAT", b"LOOP", b"CASE", b"EXT", b"TRANS", b"ROT", b"SCALE",
           b"MIRROR", b"HOLES", b"CYCLE801", b"SETAL", b"G53", b"G153", b"G20", b"G21", b"PROC", b"MCALL", b'"')
 """one of these, signs or parameters stand where `_NEEDED` finds anything in a program of SINUMERIK: absent is soon known"""

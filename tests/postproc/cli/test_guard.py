@@ -169,3 +169,10 @@ def test_a_limit_too_small_to_begin_is_said(monkeypatch: pytest.MonkeyPatch, cap
         assert guarded(lambda: ran.append(1)) == code
         assert capsys.readouterr().err.startswith(said)
     assert len(ran) == 2
+
+
+def test_what_is_left_is_not_searched_for_garbage_at_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    kept = list[int]()
+    monkeypatch.setattr(__main__.gc, "freeze", lambda: kept.append(1))
+    monkeypatch.setattr(__main__, "guarded", lambda command: 3)
+    assert ended() == 3 and kept == [1]

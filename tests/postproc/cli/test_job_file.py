@@ -12,6 +12,7 @@ import typer
 
 from postproc.cli.app import app
 from postproc.cli.shared.job_defaults import given_defaults
+from postproc.cycle_time import conversion
 from postproc.pipeline.stages import STAGES
 from postproc.setup.job_file import JobFile
 from tests.postproc.cli.test_cli import run
@@ -161,10 +162,15 @@ def test_strict_makes_warnings_errors(part: Path, tmp_path: Path) -> None:
     assert run("convert", part, "-o", out, "--strict").exit_code == 0 and out.exists()
 
 
-def test_quiet_and_verbose(part: Path, tmp_path: Path) -> None:
+def test_quiet_and_verbose(part: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "p.nc"
+    asked, estimate = list[Any](), conversion.estimate_of
+    monkeypatch.setattr(conversion, "estimate_of", lambda *a, **k: asked.append(a) or estimate(*a, **k))
     got = run("convert", part, "-o", out, "-q")
-    assert got.exit_code == 0 and got.stdout == "" and got.stderr == "" and out.exists()
+    assert got.exit_code == 0 and got.stdout == "" and got.stderr == "" and out.exists() and not asked, "no time"
+    assert json.loads(run("convert", part, "-o", out, "-q", "--json", "-").stdout)["cycle_time_s"] > 0.0 and len(asked) == 1
+    got = run("convert", part, "-o", out, "-q", "--model", "no.toml")
+    assert got.exit_code == 1 and "no.toml" in got.stderr, "what is asked for is read"
     (tmp_path / "job" / "s.toml").write_text("")
     for words in (("--quiet",), ("-qm", "mill-3axis"), ("-qmmill-3axis",), ("-q",)):
         found = run("convert", part, "-o", out, *words).stderr

@@ -6,15 +6,16 @@ import re
 
 from toolpaths.cl.text.near import nearest
 from toolpaths.cl.text.words import SILENT, TEXT_WORDS
+from toolpaths.pattern import pattern
 
-SINGLE = re.compile(r"[A-Z0-9_-]*[A-Z][A-Z0-9_-]*")
-_RULE = re.compile(r"([-=*_#~])\1{4,}")
-_LISTING = re.compile(r"\s*(?:Information listing created by\b|Tool Path Listing has \d+ lines?)",
+SINGLE = pattern(r"[A-Z0-9_-]*[A-Z][A-Z0-9_-]*")
+_RULE = pattern(r"([-=*_#~])\1{4,}")
+_LISTING = pattern(r"\s*(?:Information listing created by\b|Tool Path Listing has \d+ lines?)",
                       re.IGNORECASE)
-_LABELLED = re.compile(r"[^\W\d][\w .()-]* ?:(?:\s|$)|[^\W\d][\w .()-]*  +:")
-_NUMBERS = re.compile(r"[-+.,\s\deEdD$]*")
-_SENTENCE = re.compile(r"[A-Za-z]+(?: +[A-Za-z']+){2,}[.!]?")
-_PLAIN = re.compile(r"[\w .,+-]+")
+_LABELLED = pattern(r"[^\W\d][\w .()-]* ?:(?:\s|$)|[^\W\d][\w .()-]*  +:")
+_NUMBERS = pattern(r"[-+.,\s\deEdD$]*")
+_SENTENCE = pattern(r"[A-Za-z]+(?: +[A-Za-z']+){2,}[.!]?")
+_PLAIN = pattern(r"[\w .,+-]+")
 _SHORTEST = 3
 """letters below which every word is near another"""
 _LONGEST = 16

@@ -16,20 +16,21 @@ from toolpaths.cl.text.scan import LARGEST, LARGEST_OWN, Scan
 from toolpaths.cl.text.source import text_of
 from toolpaths.cl.text.words import BARE_WORDS, TEXT_WORDS
 from toolpaths.dataclass import dataclass
+from toolpaths.pattern import pattern
 
 Word = str | float
 _NUMBER_ENDS, _NUMBER_STARTS = "0123456789.", "+-.0123456789"
 """of what float() reads as a NUMBER does: it takes inf, nan and underscores besides, and no D for the exponent"""
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]\d+)?", re.ASCII)
-_BARE_EXPONENT = re.compile(r"[eE]\d")
+_NUMBER = pattern(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]\d+)?", re.ASCII)
+_BARE_EXPONENT = pattern(r"[eE]\d")
 """An exponent without its sign may be a damaged digit: no system writes it."""
-_CARD_LABEL = re.compile(r"\s*[A-Z]{2,3} {2,}\d{1,5}\s*")
+_CARD_LABEL = pattern(r"\s*[A-Z]{2,3} {2,}\d{1,5}\s*")
 """CATIA numbers points and circles in columns 73 to 80."""
-_REMARK = re.compile(r"\$\$->\s*(?:CSYS|CUTTER|FEATNO)\s*/")
-_MAJOR = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ ,=*.+-]*", re.ASCII)
-_SIMPLE = re.compile(r"([A-Z]+)[ ]*/([^$()/]*)", re.ASCII)
+_REMARK = pattern(r"\$\$->\s*(?:CSYS|CUTTER|FEATNO)\s*/")
+_MAJOR = pattern(r"[A-Za-z0-9_][A-Za-z0-9_ ,=*.+-]*", re.ASCII)
+_SIMPLE = pattern(r"([A-Z]+)[ ]*/([^$()/]*)", re.ASCII)
 """Most records: one major word, a slash, no comment, continuation or label."""
-_LABEL = re.compile(r"[A-Za-z0-9_]{1,32}\s*\)\s*", re.ASCII)
+_LABEL = pattern(r"[A-Za-z0-9_]{1,32}\s*\)\s*", re.ASCII)
 COMMENT = "$$"
 DATA_COMMENT = "$$->"
 _RARELY_REPEATED = frozenset({"GOTO", "GODLTA", "CNTRL", "KNOT"})
