@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from typing import Any, cast
 
 from postproc.base.version import VERSION
@@ -94,7 +95,7 @@ def _on_dask(tasks: Sequence[tuple[Task, str]], runner: Runner, where: Where) ->
 
     ended: Any = as_completed
     with ExitStack() as stack:
-        client = client_of(where, stack)
+        client = client_of(replace(where, workers=min(where.workers, len(tasks))), stack)
         futures = {client.submit(_remote, task, key, runner, key=key, pure=False, retries=0): number
                    for number, (task, key) in enumerate(tasks)}
         stack.callback(client.cancel, list(futures))

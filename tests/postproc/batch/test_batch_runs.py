@@ -27,7 +27,7 @@ from tests.postproc.batch.batch_kit import (
     planned,
     with_keys,
 )
-from toolpaths.diagnostics import DiagnosticError
+from toolpaths.diagnostics import DiagnosticError, error
 
 
 def _batch(jobs: Path, *words: str) -> tuple[int, str, dict[str, object]]:
@@ -126,6 +126,19 @@ def test_what_ends_every_worker_is_lost_alone(tmp_path: Path) -> None:
     receipts = dict(runs(tasks, killed_always, Where(2)))
     assert [receipts[k].outcome for k in range(3)] == ["done", "lost", "done"]
     assert "workers ended" in receipts[1].messages[0]
+
+
+def test_no_more_workers_begin_than_there_are_tasks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def begun(where: Where, stack: object) -> object:
+        raise DiagnosticError([error("batch.no_worker", f"{where.workers} workers")])
+
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("postproc.batch.run.client_of", begun)
+    for parts, asked, said in ((1, 64, "1 workers"), (3, 2, "2 workers")):
+        folder = tmp_path / str(parts)
+        folder.mkdir()
+        with pytest.raises(DiagnosticError, match=said):
+            list(runs(with_keys(batch_folder(folder, parts=parts)), counted_run, Where(asked)))
 
 
 def test_a_scheduler_that_does_not_answer_is_named() -> None:

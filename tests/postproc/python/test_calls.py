@@ -25,6 +25,9 @@ def test_every_example_of_the_page_gives_what_it_shows(monkeypatch: pytest.Monke
     monkeypatch.chdir(SAMPLES)
     done = doctest.testfile(str(ROOT / "docs" / "python.md"), module_relative=False)
     assert done.attempted > 20 and done.failed == 0
+    lines = (ROOT / "docs" / "python.md").read_text("utf-8").splitlines()
+    shown = " ".join(line for line in lines if line[:3] in (">>>", "..."))
+    assert [name for name in postproc.__all__ if name.islower() and f"postproc.{name}(" not in shown] == []
 
 
 def test_all_names_are_there() -> None:
