@@ -6,9 +6,9 @@ in the accelerations and square in the rates.
 Both sides count by themselves, -F_max <= F <= F_max: where gravity or friction helps,
 there is more to brake or to accelerate with. A force at the tool in its worst direction, |J^T f|, is taken off both.
 
-k s' is not linear in x = s'^2: s' <= v/2 + x/(2 v), equal at the largest speed v that a place allows, stands in its place
-where friction takes force, and x/(2 v), less than s' up to 2 v, where it gives some. So the rows hold more than is needed,
-never less.
+k s' is not linear in x = s'^2: s' <= v/2 + x/(2 v), equal at the largest speed v that a place allows (no more than that at
+which friction alone takes what a motor has), stands in its place where friction takes force, and x/(2 v), less than s' up to
+2 v, where it gives some. Up to 2 v the rows hold more than is needed, never less.
 """
 
 from __future__ import annotations
@@ -62,6 +62,9 @@ class ForceLimits:
         if per_speed.any():
             steady = self._steady(second, per_speed, low, high).min(axis=1)
             fastest = np.where(np.isfinite(speed), np.minimum(speed, np.maximum(steady, 0.5 * speed)), steady)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                alone = np.where(per_speed > 0.0, high, low) / np.abs(per_speed)
+            fastest = np.minimum(fastest, np.where(np.isfinite(alone), alone, np.inf).min(axis=1))
             fastest = np.where(np.isfinite(fastest) & (fastest > 0.0), fastest, 1.0)[:, None]
             second = second + per_speed / (2.0 * fastest)
             high, low = (np.maximum(side - np.maximum(sense * per_speed, 0.0) * 0.5 * fastest, LEAST * self.limits)

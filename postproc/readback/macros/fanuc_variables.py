@@ -35,6 +35,9 @@ class Variables:
             return self._common(index)
         if 4001 <= index <= 4130:
             return self._modal(index)
+        if self.blocks.within and index > 5000:
+            raise MacroFault("gcode.mode", f"#{index} under {self.blocks.within} is not executed",
+                             "read positions and offsets before it")
         if 5001 <= index <= 5006 or 5041 <= index <= 5046:
             axis = self._axis(index % 20 if index < 5020 else index - 5040)
             return self.blocks.track.position(axis) / self.blocks.track.scale(axis)

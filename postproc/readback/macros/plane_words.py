@@ -55,6 +55,7 @@ class PlaneWords:
             raise MacroFault("gcode.mode", "G16 under G68 is not executed", "G69 before it")
         if codes & {15.0, 16.0}:
             self.polar, self.radius, self.angle = 16.0 in codes, None, None
+        self.blocks.within = self.name if self.polar or self.turned is not None else ""
         words = [w for w in words if w.letter != "G" or w.value not in (*_ENDS, 16.0)]
         if not self.polar and self.turned is None:
             self._behind(words, axes, absolute)

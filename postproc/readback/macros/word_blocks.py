@@ -42,6 +42,7 @@ class Blocks:
     Attributes:
         rows, lines: the text that is written on, lines counted through all files; state: modal code by group, and the
             number stated last of each other letter
+        within: G16 or G68, where one is in force
         linuxcnc: G52, G92 and G10 as LinuxCNC has them, not Fanuc
     """
 
@@ -52,6 +53,7 @@ class Blocks:
         self.lines: list[int] = []
         self.state: dict[int | str, float] = {}
         self.tilted = False
+        self.within = ""
         self.second: list[int] = []
         self.skips: list[int] = []
         self.compared: dict[int, str] = {}

@@ -64,6 +64,7 @@ def test_a_bolt_hole_circle_by_radius_and_angle() -> None:
     (FANUC, "G68 R30.\n"), (FANUC, "G68 X1. Y1. R30.\nG0 X4.\n"), (FANUC, "G68 X1. Y1. R30.\nG0 X4. Y4.\nG91 X1.\n"),
     (FANUC, "G68 X1. Y1. R30.\nG28 Z0.\n"), (FANUC, "G68 X1. Y1. R30\nG69\n"), (FANUC, "G16\nG0 X10 Y30.\n"),
     (FANUC, "G52 X5.\nG0 X10\n"), (FANUC, "G68 X0. Y0. Z5. R30.\n"), (FANUC, "G68 X0. Y0. Z0. I0. J0. K1. R30.\n"),
+    (FANUC, "G68 X0. Y0. R9.\nG0 X1. Y0.\n#1=#5001\n"), (FANUC, "G16\nG0 X1. Y0.\n#1=#5041\n"),
     (FANUC, "G50.1 X0 Y0\n"), (FANUC, "G50 X0\n"), (FANUC, "G68 X0. Y0. R9.\nG16\n"), (HAAS, "G234 H1\nG68 X0. Y0. R9.\n"),
     (FANUC, "G68 X0. Y0. R9.\nG0 X1. Y0.\nG55\nX2. Y2.\n"), (FANUC, "G68 X0. Y0. R9.\nG0 X1. Y0.\nG69\nG91 X5.\n"),
     (HAAS, "G254\nG68 X0. Y0. R9.\n"), (FANUC, "G43.4 H1\nG68 X0. Y0. R9.\n"),
