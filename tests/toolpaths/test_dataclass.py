@@ -7,7 +7,7 @@ import inspect
 import pickle
 from collections.abc import Callable
 from dataclasses import FrozenInstanceError, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import pytest
 
@@ -109,6 +109,16 @@ def test_the_first_values_are_made_as_the_later_ones_are() -> None:
     assert [(m.a, m.b, m.c) for m in made] == [(k, (1,), [k]) for k in range(len(made))]
     assert Plain(1).c is not Plain(1).c and list(vars(made[0])) == list(vars(made[-1])) == ["a", "b", "c"]
     assert pickle.loads(pickle.dumps(made)) == made and len({Plain(1, (2,)) == Plain(1, (2,)), True}) == 1
+
+
+@pytest.mark.parametrize("call", [
+    lambda c: c(1, a=2), lambda c: c(1, 2, b=3), lambda c: c(1, 2, 3, 4), lambda c: c(b=2), lambda c: c(1, d=2),
+    lambda c: c()])
+def test_the_first_value_is_refused_where_the_standard_library_refuses_it(call: Callable[[Any], object]) -> None:
+    standard, own = (make(frozen=True)(type("Few", (), {"__annotations__": {"a": int, "b": int, "c": int}, "b": 2, "c": 3}))
+                     for make in MAKERS)
+    kind, words = cast("tuple[str, str]", outcome(lambda: call(standard)))
+    assert kind == "TypeError" and outcome(lambda: call(own)) == (kind, words)
 
 
 def test_a_class_with_methods_of_its_own_keeps_them() -> None:
