@@ -65,14 +65,14 @@ class _FirstCalled:
 
     def _by_names(self, value: Any, /, *args: object, **given: object) -> None:
         """What the compiled one does; where a field is missing, unknown or given twice, it is that one that says so."""
-        named = {**dict(zip((field.name for field in self.fields), args, strict=False)), **given}
+        named: dict[str, Any] = {**dict(zip((field.name for field in self.fields), args, strict=False)), **given}
+        twice = len(named) < len(args) + len(given)
         for field in self.fields:
             if field.name not in named and field.default is not MISSING:
                 named[field.name] = field.default
             elif field.name not in named and field.default_factory is not MISSING:
                 named[field.name] = field.default_factory()
-        if len(named) != len(self.fields) or len(args) + len(given) > len(named) or any(
-                field.name not in named for field in self.fields):
+        if twice or len(named) != len(self.fields) or any(field.name not in named for field in self.fields):
             self._compiled()(value, *args, **given)
             return
         value.__dict__.update((field.name, named[field.name]) for field in self.fields)

@@ -7,7 +7,7 @@ import inspect
 import pickle
 from collections.abc import Callable
 from dataclasses import FrozenInstanceError, field
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import pytest
 
@@ -119,6 +119,16 @@ def test_fields_have_any_name() -> None:
             for k in range(COMPILED_FROM + 2):
                 first = dataclasses.replace(cls(**{name: k, "second": 2}), second=3)
                 assert (getattr(first, name), first.second) == (k, 3)
+
+
+@pytest.mark.parametrize("call", [
+    lambda c: c(1, a=2), lambda c: c(1, 2, b=3), lambda c: c(1, 2, 3, 4), lambda c: c(b=2), lambda c: c(1, d=2),
+    lambda c: c()])
+def test_the_first_value_is_refused_where_the_standard_library_refuses_it(call: Callable[[Any], object]) -> None:
+    standard, own = (make(frozen=True)(type("Few", (), {"__annotations__": {"a": int, "b": int, "c": int}, "b": 2, "c": 3}))
+                     for make in MAKERS)
+    kind, words = cast("tuple[str, str]", outcome(lambda: call(standard)))
+    assert kind == "TypeError" and outcome(lambda: call(own)) == (kind, words)
 
 
 def test_a_class_with_methods_of_its_own_keeps_them() -> None:
