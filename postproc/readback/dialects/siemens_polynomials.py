@@ -19,7 +19,7 @@ from postproc.readback.dialects.iso import New
 from postproc.readback.text.canonical import CURVE, STATEMENT, DialectStatement
 from postproc.readback.text.modal import codes
 from postproc.readback.text.words import Words
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, Ints
 from toolpaths.cl.spline_chords import DEGREE
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?"
@@ -61,7 +61,7 @@ class Polynomials:
 
     def __init__(self, words: Words) -> None:
         self.ended = codes(words, "G", _MOTION)[0]
-        self.waiting = codes(words, "G", (4,))[0]
+        self.parting = _parting(words)
         self.begun = -1
         self.curves: list[Floats] = []
         self.splines: list[int] = []
@@ -112,16 +112,17 @@ class Polynomials:
         moving = np.unique(words.line[np.isin(words.letter & 95, [ord(a) for a in axes])])
         others = [b for b, here in blocks.items() if any(s.name == "POLY" for s in here)]
         stops = np.sort([*self.ended, *self.polygons, *others, words.lines + 1])
+        other = min((b for b, here in blocks.items() for s in here
+                     if s.name in _STATED and s.number(0) != _STATED[s.name]), default=words.lines + 1)
         wrong = []
         for number, begin in enumerate(self.polygons):
             end = int(stops[np.searchsorted(stops, begin, side="right")])
             rows = moving[(moving >= begin) & (moving < end)].tolist()
-            stated = [s for b in range(begin, end) for s in blocks.get(b, ())]
-            waits = rows and bool(((self.waiting > rows[0]) & (self.waiting < rows[-1])).any())
+            parted = rows and bool(((self.parting > rows[0]) & (self.parting <= rows[-1])).any())
             amid = [s for b in range(rows[0] + 1, rows[-1] + 1) for s in blocks.get(b, ())] if rows else []
-            if why := _refused(stated, [blocks.get(b, []) for b in rows], end in self.polygons) or (
-                    "another function, or G4, amid the points of BSPLINE"
-                    if waits or any(s.name not in _AMID for s in amid) else ""):
+            if why := _refused(other < end, [blocks.get(b, []) for b in rows], end in self.polygons) or (
+                    "another function, G code, T, D or stop amid the points of BSPLINE"
+                    if parted or any(s.name not in _AMID for s in amid) else ""):
                 wrong.append((begin, why))
                 continue
             new += [(b, CURVE, float(len(self.curves) + n)) for n, b in enumerate(rows)]
@@ -130,9 +131,16 @@ class Polynomials:
         return wrong
 
 
-def _refused(stated: list[DialectStatement], points: list[list[DialectStatement]], again: bool) -> str:
-    """Why a BSPLINE is not executed, by all its statements and those of the blocks of its points; "" where it is."""
-    if any(s.number(0) != value for s in stated for name, value in _STATED.items() if s.name == name):
+def _parting(words: Words) -> Ints:
+    """Blocks with what may not stand amid points of a BSPLINE: other places, tools, units, waits or stops."""
+    line, value = words.pick("G")
+    return np.sort(np.concatenate([line[(value != 90) & (value != 91)], words.pick("T")[0], words.pick("D")[0],
+                                   codes(words, "M", (0, 1))[0]]))
+
+
+def _refused(other: bool, points: list[list[DialectStatement]], again: bool) -> str:
+    """Why a BSPLINE is not executed, by `other` weights or degrees and the blocks of its points, "" for nothing."""
+    if other:
         return "BSPLINE with PW other than 1, or SD other than 3"
     lengths = [[s.number(0) for s in here if s.name == "PL"] for here in points]
     if any(len(one) != 1 for one in lengths) or len({one[0] for one in lengths}) != 1 or not lengths[0][0] > 0.0:
