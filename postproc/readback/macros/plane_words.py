@@ -20,7 +20,7 @@ _ENDS = (15.0, 50.0, 50.1)
 _NOT_WITHIN = (10.0, 20.0, 21.0, 28.0, 30.0, 31.0, 52.0, 53.0, 92.0, 43.4, 43.5, 234.0, 254.0, 68.2, 17.0, 18.0, 19.0, 54.0,
                55.0, 56.0, 57.0, 58.0, 59.0, 54.1, 154.0)
 """codes that state other coordinates: reference positions, work and local coordinate systems (refused by Fanuc as well)"""
-_BESIDE = (17.0, 18.0, 19.0, 20.0, 21.0, 54.0, 55.0, 56.0, 57.0, 58.0, 59.0, 54.1, 154.0)
+_WITH_OTHERS = (17.0, 18.0, 19.0, 20.0, 21.0, 54.0, 55.0, 56.0, 57.0, 58.0, 59.0, 54.1, 154.0)
 """of them, those that may stand in the block of G16 or G68 itself"""
 _ROUND, _TIP = (2.0, 3.0), (43.4, 43.5, 234.0)
 
@@ -61,7 +61,7 @@ class PlaneWords:
             self._behind(words, axes, absolute)
             return words
         for code in sorted(codes):
-            if code in _NOT_WITHIN and not (code in _BESIDE and codes & {16.0, 68.0}):
+            if code in _NOT_WITHIN and not (code in _WITH_OTHERS and codes & {16.0, 68.0}):
                 raise MacroFault("gcode.mode", f"G{code:g} under {self.name} is not executed", f"{self.end} before it")
         given = {w.letter: w.value for w in words}
         if 4.0 in codes or not any(a in given for a in (*axes, *CENTRES)):
