@@ -47,6 +47,7 @@ _CONTINUED = pattern(rb"~[ \t]*\n")
 _COMMENT, _STRING = re.compile(rb";[^\n]*"), re.compile(rb'(?<!T=)"[^"\n]*"')
 _SIGNS = pattern(rb"=[ \t]*[-+]*[ \t]*(?:[A-Z_$(\[]|[\d.]+[ \t]*[-+*/])")
 _POLYNOMIAL = pattern(rb"(?:\bPO[ \t]*\[[ \t]*[A-Z]?[ \t]*\][ \t]*=|=[ \t]*PO)[ \t]*\([-+.,\dEX \t]*\)")
+_CONTROL_POINTS = pattern(rb"(?m)^[^;(\n]*\bBSPLINE\b")
 """polynomials of numbers, which the dialect reads by itself"""
 _PARAMETERS = pattern(rb"R\d+[ \t]*=")
 _WORDS = (b"DEF", b"IF", b"GOTO", b"FOR", b"WHILE", b"REPEAT", b"LOOP", b"CASE", b"EXT", b"TRANS", b"ROT", b"SCALE",
@@ -106,8 +107,8 @@ def executed(data: bytes, file: str, others: Mapping[str, bytes], language: Macr
         text, found = (text, []) if language == "siemens" else numbered(text, name)
         made, more = rows(text, name)
         return made, [*found, *more]
-    if language == "siemens" and (curve := _POLYNOMIAL.search(data.upper())):
-        fault = MacroFault("gcode.curve", "a polynomial (POLY, PO) in a program with variables, jumps or frames is not "
+    if language == "siemens" and (curve := _POLYNOMIAL.search(data.upper()) or _CONTROL_POINTS.search(data.upper())):
+        fault = MacroFault("gcode.curve", "a curve (POLY, PO, BSPLINE) in a program with variables, jumps or frames is not "
                            "executed", "write such a curve as lines or arcs, or the program without them")
         return None, [fault.at(file, data.count(b"\n", 0, curve.start()) + 1)]
     sources = ProgramFiles(data, file, others, cleaned)

@@ -149,7 +149,7 @@ def test_control_points_as_the_pages_have_them() -> None:
     "BSPLINE X1 PL=1\nX2 Y1 PL=1\nX3 SUPA PL=1\n", "BSPLINE X1 PL=1 PL=1\nX2 Y1 PL=1\nX3 PL=1\n", "BSPLINE\nG1 X5\n",
     "SD=2\nBSPLINE X1 PL=1\nX2 Y1 PL=1\nX3 PL=1\n", "PW=3\nBSPLINE X1 PL=1\nX2 Y1 PL=1\nX3 PL=1\n",
     *(f"BSPLINE X1 PL=1\n{amid}X2 Y1 PL=1\nX3 PL=1\n" for amid in (
-        "G55 ", "G55\n", "D0\n", "T2\n", "M0\n", "M1\n", "G9 ", "G60\n", "G700\n"))])
+        "G55 ", "G55\n", "D0\n", "T2\n", "M0\n", "M1\n", "G9 ", "G60\n", "G700\n", "TRANS X5\n", "AROT Z30\n", "R1=2\n"))])
 def test_other_control_points_are_refused(body: str) -> None:
     head = "G17 G710 G90 G94 G40 G64\nG54\nG0 X0 Y0 Z0\nG1 X0 F600\n"
     assert "gcode.curve" in faults(SIEMENS, head + body + "M30\n")
