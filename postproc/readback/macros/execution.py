@@ -107,7 +107,8 @@ def executed(data: bytes, file: str, others: Mapping[str, bytes], language: Macr
         text, found = (text, []) if language == "siemens" else numbered(text, name)
         made, more = rows(text, name)
         return made, [*found, *more]
-    if language == "siemens" and (curve := _POLYNOMIAL.search(data.upper()) or _CONTROL_POINTS.search(data.upper())):
+    upper = data.upper() if language == "siemens" else b""
+    if curve := _POLYNOMIAL.search(upper) or _CONTROL_POINTS.search(upper):
         fault = MacroFault("gcode.curve", "a curve (POLY, PO, BSPLINE) in a program with variables, jumps or frames is not "
                            "executed", "write such a curve as lines or arcs, or the program without them")
         return None, [fault.at(file, data.count(b"\n", 0, curve.start()) + 1)]
