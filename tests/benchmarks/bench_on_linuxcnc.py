@@ -1,9 +1,10 @@
-"""Words of `--feed planned` on LinuxCNC's simulator, ten paths: limits kept, time foretold, not slower than programmed.
+"""Choices of the post on LinuxCNC's simulator: limits kept, time foretold, nothing slower than what it replaces.
 
-    python tests/benchmarks/bench_planned_on_linuxcnc.py [PATH ...]
+    python tests/benchmarks/bench_on_linuxcnc.py feeds [PATH ...]      ten paths, programmed and planned words
+    python tests/benchmarks/bench_on_linuxcnc.py axes [PART ...]       five parts, tool axes of the file and `--orient auto`
 
-Of each path with programmed and with planned words: s of the program on the simulator, the same as `time` says, largest
-shares of velocity and acceleration that an axis uses in any servo cycle, and where.
+Of each program: s on the simulator, the same as `time` says, largest shares of velocity and acceleration that an axis uses
+in any servo cycle, and where.
 """
 
 from __future__ import annotations
@@ -28,7 +29,11 @@ from tests.linuxcnc.simulator import Run, recorded
 from tests.postproc.kit import SAMPLES, good, machine, tool_setup, toolpath
 from tests.postproc.planning.test_planned_feed import wave
 from tests.postproc.planning.test_word_feeds import PATHS
+from toolpaths.diagnostics import has_errors
 from toolpaths.units import DEG
+
+sys.path.insert(0, str(SAMPLES))
+import orientation as samples  # found on the path set above
 
 CYCLE = 1e-3
 TOOLS = {int(number): (tool.gauge_length or 0.0, 6.0) for number, tool in tool_setup().tools.items()}
@@ -55,33 +60,46 @@ def paths() -> dict[str, Make]:
     return found
 
 
-def shares(run: Run, made: PostResult) -> str:
+def shares(of: Run, made: PostResult) -> str:
     """Largest shares of velocity and acceleration, with axis and second."""
     limits, words = made.machine.limits, list[str]()
-    rates = np.diff(run.joints * np.where(np.array(made.machine.rotary), DEG, 1.0), axis=0) / CYCLE
+    rates = np.diff(of.joints * np.where(np.array(made.machine.rotary), DEG, 1.0), axis=0) / CYCLE
     for used in (np.abs(rates / limits.velocity), np.abs(np.diff(rates, axis=0) / CYCLE / limits.acceleration)):
         at = np.unravel_index(int(used.argmax()), used.shape)
         words.append(f"{used[at]:.3f} ({made.machine.axis_names[int(at[1])]} at {at[0] * CYCLE:.2f} s)")
     return "  ".join(words)
 
 
-def main(*chosen: str) -> None:
+def run(name: str, what: str, made: PostResult) -> float:
+    """s of the program on the simulator; prints its line."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "p.ngc"
+        file.write_text(made.text)
+        found = recorded(made.machine, file, TOOLS)
+    foretold = program_clock("linuxcnc")(made).seconds
+    print(f"{name:18}{what:12}{found.seconds:9.3f} s, foretold {foretold:9.3f} ({foretold / found.seconds - 1.0:+.2%})  "
+          f"{shares(found, made)}  {'uncertain' if found.uncertain else ''} {' '.join(found.errors)}", flush=True)
+    return found.seconds
+
+
+def feeds(*chosen: str) -> None:
     for name, make in paths().items():
+        if not chosen or name in chosen:
+            before = run(name, "programmed", make("programmed"))
+            print(f"{name:18}planned / programmed {run(name, 'planned', make('planned')) / before:.4f}", flush=True)
+
+
+def axes(*chosen: str) -> None:
+    still = replace(machine("mikron-ucp710"), timing=Timing())
+    for name, part in samples.PARTS.items():
         if chosen and name not in chosen:
             continue
-        seconds = {}
-        for feed in ("programmed", "planned"):
-            made = make(feed)
-            with tempfile.TemporaryDirectory() as folder:
-                file = Path(folder) / "p.ngc"
-                file.write_text(made.text)
-                run = recorded(made.machine, file, TOOLS)
-            seconds[feed] = run.seconds
-            foretold = program_clock("linuxcnc")(made).seconds
-            print(f"{name:18}{feed:12}{run.seconds:9.3f} s, foretold {foretold:9.3f} ({foretold / run.seconds - 1.0:+.2%})  "
-                  f"{shares(run, made)}  {'uncertain' if run.uncertain else ''} {' '.join(run.errors)}", flush=True)
-        print(f"{name:18}planned / programmed {seconds['planned'] / seconds['programmed']:.4f}", flush=True)
+        path, found = toolpaths.read_bytes(part()[0].encode(), file=f"{name}.cls")
+        assert not has_errors(found), found
+        seconds = [run(name, plan, good(convert(path, still, "linuxcnc", tool_setup(), Options(orient=plan, feed="planned"),
+                                                clock=program_clock("linuxcnc")))) for plan in ("keep", "auto")]
+        print(f"{name:18}auto / keep {seconds[1] / seconds[0]:.4f}", flush=True)
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    {"feeds": feeds, "axes": axes}[sys.argv[1]](*sys.argv[2:])
