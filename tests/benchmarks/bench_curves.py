@@ -3,8 +3,8 @@
     python tests/benchmarks/bench_curves.py [CURVES] [CONTROLLER ...]
 
 Curves of 5 to 12 control points round a circle that waves, once in a plane and once in space, one after the other with
-a rapid between; no rotary axis, the part off the machine's origin. Each program is written and proved at a tolerance of 0.01 mm:
-with arcs and chords, and on Siemens and TNC as cubics (`[control] splines = true`: POLY, SPL) and, on Siemens, by control
+a rapid between; no rotary axis, the part off the machine's origin. Each program is written and proved at 0.01 mm: with
+arcs and chords, and on Siemens and TNC as cubics (`[control] splines = true`: POLY, SPL) and, on Siemens, by control
 points (`splines = "bspline"`). Each row: lines of the program, and the mm that are proved.
 """
 
