@@ -30,7 +30,6 @@ from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
 
-
 _STRETCH = 60_000
 """moves that become blocks together: what is known of them meanwhile stays small"""
 
