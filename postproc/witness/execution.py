@@ -67,7 +67,9 @@ class Execution:
         self.last_direction = 1
         self.coolant, self.cycle, self.cycles = HeldValues(UNKNOWN), HeldValues(-1), list[WitnessCycle]()
         self.armed = -1
-        self.ball, self.radius, self.cutter = HeldValues(math.nan), HeldValues(math.nan), HeldValues(math.nan)
+        self.radius, self.cutter = HeldValues(math.nan), HeldValues(math.nan)
+        self.end: HeldValues = HeldValues((math.nan, math.nan))
+        self.surface: dict[int, tuple[float, ...]] = {}
         self.rests, self.stops = list[Pause](), list[Pause]()
         self.arcs: dict[int, arcs.Given] = {}
         self.toward: tuple[float, ...] | None = None

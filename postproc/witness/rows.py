@@ -51,7 +51,10 @@ def assembled(e: Execution) -> Commanded:
     rapid = rapid[rapid < n]
     kind[rapid[kind[rapid] != HOLE]] = RAPID
     kind[start[start < n]] = START
-    feed, spindle = np.array(e.feed.values, np.float64), np.array(e.spindle.values, np.float64)
+    surface = np.full((n, 3), np.nan) if e.surface else np.broadcast_to(np.nan, (n, 3))
+    for row, given_ in e.surface.items():
+        surface[row] = np.array(given_) if common[row] else e.frames[place[row]][0] @ np.array(given_)
+    feed, spindle, end = (np.array(one.values, np.float64) for one in (e.feed, e.spindle, e.end))
     known = e.known.column(n, bool) & np.isfinite(tip).all(axis=1) & np.isfinite(axis).all(axis=1)
     gap = np.zeros(n, bool)
     gap[[row for row in e.gap if row < n] + uncertain] = True
@@ -62,8 +65,9 @@ def assembled(e: Execution) -> Commanded:
                      e.spindle.spread(spindle[:, 0].astype(np.int64), n), e.spindle.spread(spindle[:, 1], n),
                      e.spindle.spread(np.array(e.spindle.rows), n), e.coolant.column(n, np.int64),
                      e.coolant.spread(np.array(e.coolant.rows), n), e.systems, _first_system(e, place),
-                     e.radius.column(n, np.float64), e.ball.column(n, np.float64), e.cutter.column(n, np.float64),
-                     tuple(e.rests), tuple(e.stops), _splines(e, tip, place, common), e.unread)
+                     e.radius.column(n, np.float64), e.end.spread(end[:, 0], n), e.end.spread(end[:, 1], n),
+                     e.cutter.column(n, np.float64), surface, tuple(e.rests), tuple(e.stops),
+                     _splines(e, tip, place, common), e.unread)
 
 
 def _splines(e: Execution, tip: Array, place: Array, common: Array) -> dict[int, Array]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from postproc.witness.clamps import check_clamps
 from postproc.witness.clfile import commanded
-from postproc.witness.commanded import LINE, Commanded
+from postproc.witness.commanded import LINE, RAPID, Commanded, unit
 from postproc.witness.errors import ErrorChain, error_chain
 from postproc.witness.evidence import Aspect, Case, Compared, ExecutedBlocks, Finding, NotCompared, Testimony
 from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged, other_limits
@@ -61,14 +61,38 @@ def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
 
 
 def _reoriented(c: Commanded, axes: Array) -> Commanded:
-    """With other tool axes: balls, and arcs, stay where they are; a tool that is turned and no ball is not known. A straight
-    cut whose tip goes farther or less far for it takes the time that it had."""
+    """With other tool axes: balls and corners touch where they did, arcs stay where they are; a tool that is turned and ends
+    otherwise is not known. A straight cut whose tip goes farther or less far for it takes the time that it had."""
     turned = np.abs(axes - c.axis).max(axis=1) > 1e-12
-    move = np.where(turned[:, None], c.ball[:, None] * (c.axis - axes), 0.0)
+    surface = _surface(c, axes, turned & (c.flat > 0.0))
+    move = np.where(turned[:, None], _corner(c, c.axis, surface) - _corner(c, axes, surface), 0.0)
     centre, arcs = c.centre.copy(), np.flatnonzero(c.arc >= 0)
     centre[c.arc[arcs]] += move[arcs]
     return replace(c, tip=c.tip + move, axis=np.where(turned[:, None], axes, c.axis), centre=centre,
                    known=c.known & np.isfinite(move).all(axis=1), feed=c.feed * _longer(c, turned, move))
+
+
+def _corner(c: Commanded, axes: Array, surface: Array) -> Array:
+    """(N, 3) from tips along `axes` to the centre of ball or corner next to where it touches a surface of such normals."""
+    centre = c.corner[:, None] * axes
+    cornered = np.flatnonzero(c.flat > 0.0)
+    if len(cornered):
+        a, n = axes[cornered], surface[cornered]
+        centre[cornered] += c.flat[cornered, None] * unit(a * (a * n).sum(axis=1, keepdims=True) - n)
+    return centre
+
+
+def _surface(c: Commanded, axes: Array, wanted: Array) -> Array:
+    """(N, 3) normals: a rapid without one that turns with a cut has that of the cut it draws back from, or of the next."""
+    lacking = np.flatnonzero(wanted & np.isnan(c.surface[:, 0]) & (c.kind == RAPID))
+    stated = np.flatnonzero(~np.isnan(c.surface[:, 0]))
+    if not len(lacking) or not len(stated):
+        return c.surface
+    surface, at = c.surface.copy(), np.searchsorted(stated, lacking)
+    before, behind = stated[np.maximum(at - 1, 0)], stated[np.minimum(at, len(stated) - 1)]
+    drawn = (before == lacking - 1) & (c.kind[before] != RAPID) & (np.abs(axes[before] - axes[lacking]).max(axis=1) < 1e-9)
+    surface[lacking] = c.surface[np.where(drawn, before, behind)]
+    return surface
 
 
 def _longer(c: Commanded, turned: Array, move: Array) -> Array:
