@@ -3,8 +3,9 @@
     python tests/benchmarks/bench_batch.py [RUNS]
 
 Prints wall and processor time of RUNS conversions (default 60) in this process and on two warm workers, the load of the
-computer (above 1 the wall times are no measure; processor times are), how long the scheduler takes for a task that is done already, and what these figures give for 10,000 runs on 64 and 1000 workers: tasks go to the worker
-that is free first, the scheduler hands out one after the other.
+computer (above 1 wall times are no measure; processor times are), how long the scheduler takes for a task that is done
+already, and what these figures give for 10,000 runs on 64 and 1000 workers: tasks go to the worker that is free first, the
+scheduler hands out one after the other.
 """
 
 from __future__ import annotations
