@@ -93,7 +93,7 @@ def _staged(command: str, printed: str, given: Stage) -> str:
         os.chdir(words[1])
         return ""
     for start, prepare in given.before.items():
-        if words[1:][:len(start.split())] == start.split():
+        if shlex.join(words[1:]).startswith(start):
             prepare()
     for long, short in given.instead.items():
         command = command.replace(long, short)

@@ -1,6 +1,6 @@
 """What the commands and Python blocks of pages find in their folder: files by the names that pages give them, and names.
 
-Every page runs in a folder of its own with the files of `SHOP`; `STAGES` has what a page needs besides, by its place in the
+Every page runs in a folder of its own with the files of `shop`; `stages` has what a page needs besides, by its place in the
 project. The part is small: what takes long with real parts is under test in its own room.
 """
 
@@ -18,10 +18,12 @@ from typing import Any
 
 import numpy as np
 
+import machines
 from tests.machines.exchange.test_fusion import trunnion
 
 ROOT = Path(__file__).parents[2]
 SAMPLES = ROOT / "samples"
+PACKAGE = Path(machines.__file__).parent
 TOOLS = (SAMPLES / "tools.setup.toml").read_text("utf-8")
 ORIGIN = "[part]\norigin = [15, -8, 30]\n"
 FAR = TOOLS + "[part]\norigin = [-13, 15, -250]\n[output]\nrapids_as_feed = true\n"
@@ -51,7 +53,7 @@ class Stage:
     """What a page needs. (`report --figures` is under test in tests/postproc/page.)
 
     Attributes:
-        files: text of files by name; "" takes a file of SHOP away
+        files: text of files by name; "" takes a file of `shop` away
         copies: files and folders of the project, by the name that the page gives them
         before: what happens in the folder before a command that begins with this
         names: of Python blocks, made in the page's folder
@@ -102,13 +104,13 @@ def logged(file: str, controller: str) -> None:
 
 def tables() -> dict[str, str]:
     """The CSV tables that the page of error models shows, by the names in their first lines."""
-    text = (ROOT / "machines/geometric_error/README.md").read_text("utf-8")
+    text = (PACKAGE / "geometric_error/README.md").read_text("utf-8")
     return dict(re.findall(r"```csv\n# (\S+\.csv)\n(.*?)\n```", text, re.DOTALL))
 
 
 def sheet() -> str:
     """The data sheet that its page shows."""
-    return (ROOT / "machines/sheet/README.md").read_text("utf-8").split("```toml\n")[1].split("```")[0]
+    return (PACKAGE / "sheet/README.md").read_text("utf-8").split("```toml\n")[1].split("```")[0]
 
 
 def shop() -> dict[str, str]:
@@ -125,8 +127,6 @@ def _placed() -> None:
 
 
 def _arrays() -> dict[str, Any]:
-    import machines
-
     machine = machines.load("mikron-ucp710")
     q = np.array([[10.0, 20.0, -30.0, 0.5, 1.0]])
     tip, axis = machine.kinematics.with_tool(80.0).forward(q)
@@ -134,7 +134,6 @@ def _arrays() -> dict[str, Any]:
 
 
 def _read() -> dict[str, Any]:
-    import machines
     import toolpaths
     from postproc.setup.model import load_setup
 
@@ -151,7 +150,6 @@ def _clock() -> dict[str, Any]:
 
 
 def _feeds() -> dict[str, Any]:
-    import machines
     from tests.postproc.feedrate_kit import random_path
 
     q = np.zeros((1, 5))
@@ -172,50 +170,55 @@ MACHINE = Stage({"shop.toml": 'base = "mikron-ucp710"\n', "shop.setup.toml": TOO
                 instead={"%1": "part.cls", "%2": "part.mpf"})
 """pages of CAM systems: shop.toml is a machine there"""
 SMALL = Stage(instead={"samples/pocket.cls": "part.cls", "samples/bicubic.cls": "part.cls"})
-STAGES = {
-    "README.md": Stage(
-        files={"shop.toml": "", **{f"samples/{name}.cls": part(1) for name in ("pocket", "five_faces")}},
-        copies={"measurements.toml": "samples/calibration/reversal.toml",
-                "reversal.csv": "samples/calibration/reversal.csv",
-                **{f"samples/{name}": f"samples/{name}" for name in ("tools.setup.toml", "batch")},
-                **{f"mikron-ucp710-{axis}.csv": f"samples/errors/mikron-ucp710-{axis}.csv" for axis in "XYZ"}},
-        before={"time part.ngc -m mikron-ucp710 -c linuxcnc --calibrate": partial(logged, "part.ngc", "linuxcnc"),
-                "place": _placed},
-        instead={"-j 4": "-j 1", " --figures pictures": "", "-m trunnion-bc -c fanuc-30i": "-c fanuc-30i",
-                 "orient part.cls": "orient part.cls --max-tilt 5", "--orient auto": "--orient auto --max-tilt 5"}),
-    "docs/how-to/calibrate-the-time.md": Stage(
-        files={name: program("siemens-840d") for name in ("part.nc", "next.nc")},
-        before={"time part.nc -m mikron-ucp710 -c siemens-840d --calibrate": partial(logged, "part.nc", "siemens-840d")}),
-    "docs/how-to/from-nx.md": MACHINE,
-    "docs/how-to/time-report.md": SMALL,
-    "docs/how-to/show-a-program.md": SMALL,
-    "docs/how-to/planned-feeds.md": SMALL,
-    "docs/how-to/from-fusion.md": replace(MACHINE, files=MACHINE.files | {
-        "shop.toml": "", "shop.mch": dumps(trunnion()), "shop.setup.toml": FAR}),
-    "machines/README.md": Stage(names=_arrays),
-    "machines/sheet/README.md": Stage(files={"shop.toml": ""}),
-    "machines/calibration/README.md": Stage(copies={
-        f"samples/{name}": f"samples/{name}" for name in ("calibration", "tool_axis_tour.apt", "tools.setup.toml")}),
-    "machines/geometric_error/README.md": Stage(
-        files={"x.comp": "-100 -100.002 -100.001\n0 0 0.001\n100 100.003 100.004\n",
-               "y.csv": "Y [mm],EYY [um],EXY [um]\n-200,0,1\n200,4,2\n",
-               **{name: f"{head}\n" for name, head in tables().items()}},
-        copies={one.name: f"samples/errors/{one.name}" for one in sorted((SAMPLES / "errors").glob("*.*"))},
-        names=_arrays, instead={"--step C=30": "--step C=120", "--loss 5": "--loss 20"}),
-    "postproc/clock/README.md": Stage(names=_clock),
-    "postproc/feedrate/README.md": Stage(names=_feeds),
-    "postproc/orientation/README.md": Stage(names=_read),
-    "postproc/placement/README.md": Stage(files={"shop.toml": TOOLS + PLACED}, names=_read),
-    "samples/bridges/fusion/README.md": MACHINE,
-    "samples/bridges/solidworks/README.md": MACHINE,
-    "samples/bridges/mastercam/README.md": MACHINE,
-    "toolpaths/README.md": Stage(names=_curves),
-}
+
+
+@cache
+def stages() -> dict[str, Stage]:
+    """What pages need besides those of `shop`, by their places in the project; made when a page is run."""
+    return {
+        "README.md": Stage(
+            files={"shop.toml": "", **{f"samples/{name}.cls": part(1) for name in ("pocket", "five_faces")}},
+            copies={"measurements.toml": "samples/calibration/reversal.toml",
+                    "reversal.csv": "samples/calibration/reversal.csv",
+                    **{f"samples/{name}": f"samples/{name}" for name in ("tools.setup.toml", "batch")},
+                    **{f"mikron-ucp710-{axis}.csv": f"samples/errors/mikron-ucp710-{axis}.csv" for axis in "XYZ"}},
+            before={"time part.ngc -m mikron-ucp710 -c linuxcnc --calibrate": partial(logged, "part.ngc", "linuxcnc"),
+                    "place": _placed},
+            instead={"-j 4": "-j 1", " --figures pictures": "", "-m trunnion-bc -c fanuc-30i": "-c fanuc-30i",
+                     "orient part.cls": "orient part.cls --max-tilt 5", "--orient auto": "--orient auto --max-tilt 5"}),
+        "docs/how-to/calibrate-the-time.md": Stage(
+            files={name: program("siemens-840d") for name in ("part.nc", "next.nc")},
+            before={"time part.nc -m mikron-ucp710 -c siemens-840d --calib": partial(logged, "part.nc", "siemens-840d")}),
+        "docs/how-to/from-nx.md": MACHINE,
+        "docs/how-to/time-report.md": SMALL,
+        "docs/how-to/show-a-program.md": SMALL,
+        "docs/how-to/planned-feeds.md": SMALL,
+        "docs/how-to/from-fusion.md": replace(MACHINE, files=MACHINE.files | {
+            "shop.toml": "", "shop.mch": dumps(trunnion()), "shop.setup.toml": FAR}),
+        "machines/README.md": Stage(names=_arrays),
+        "machines/sheet/README.md": Stage(files={"shop.toml": ""}),
+        "machines/calibration/README.md": Stage(copies={
+            f"samples/{name}": f"samples/{name}" for name in ("calibration", "tool_axis_tour.apt", "tools.setup.toml")}),
+        "machines/geometric_error/README.md": Stage(
+            files={"x.comp": "-100 -100.002 -100.001\n0 0 0.001\n100 100.003 100.004\n",
+                   "y.csv": "Y [mm],EYY [um],EXY [um]\n-200,0,1\n200,4,2\n",
+                   **{name: f"{head}\n" for name, head in tables().items()}},
+            copies={one.name: f"samples/errors/{one.name}" for one in sorted((SAMPLES / "errors").glob("*.*"))},
+            names=_arrays, instead={"--step C=30": "--step C=120", "--loss 5": "--loss 20"}),
+        "postproc/clock/README.md": Stage(names=_clock),
+        "postproc/feedrate/README.md": Stage(names=_feeds),
+        "postproc/orientation/README.md": Stage(names=_read),
+        "postproc/placement/README.md": Stage(files={"shop.toml": TOOLS + PLACED}, names=_read),
+        "samples/bridges/fusion/README.md": MACHINE,
+        "samples/bridges/solidworks/README.md": MACHINE,
+        "samples/bridges/mastercam/README.md": MACHINE,
+        "toolpaths/README.md": Stage(names=_curves),
+    }
 
 
 def stage(page: Path) -> Stage:
-    """What a page needs besides SHOP."""
-    return STAGES.get(page.relative_to(ROOT).as_posix(), Stage()) if page.is_relative_to(ROOT) else Stage()
+    """What a page needs besides those of `shop`."""
+    return stages().get(page.relative_to(ROOT).as_posix(), Stage()) if page.is_relative_to(ROOT) else Stage()
 
 
 def lay(folder: Path, given: Stage) -> None:
