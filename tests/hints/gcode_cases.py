@@ -60,6 +60,7 @@ _ISO = [
     of("gcode.repeated", LINUXCNC, "", "G0 X1 X2\n", "G0 X1\n", "one of each in a block"),
     of("gcode.syntax", LINUXCNC, "", "G0 X\n", "G0 X3\n", "a block is letters with numbers"),
     of("gcode.unknown_code", LINUXCNC, "", "M123\n", "", "take it out"),
+    of("gcode.decimal_point", FANUC, "", "G05.1 Q1 R5.\nG05.1 Q0\n", "G05.1 Q1 R5\nG05.1 Q0\n", "write a whole number"),
     of("gcode.unknown_word", LINUXCNC, "", "G0 B5\n", r"G0 \1 5\n", "its axes are (X)"),
     of("gcode.unknown_word", SIEMENS, "", "SHOPCALL(1)\n", "", "take it out|neither a function"),
     of("gcode.feed", LINUXCNC, "G1 X5 F200\n", "G1 X5\n", r"G1 X5 \g<1>200\n", "state (F) before them"),
