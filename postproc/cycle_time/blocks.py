@@ -136,8 +136,8 @@ class MotionBlocks:
         tip: of the motion that `row` counts in; None where none is known
         level (E,): of the control's smoothing, NaN where the program states none, OFF where it has not switched it on; None
             where no dialect says
-        turn_tolerance (E,): rad that the smoothing may take of rotary axes (third value of CYCLE832, TA of cycle 32); NaN or
-            inf where the program does not say; None where no dialect says
+        turn_tolerance (E,): rad that the smoothing may take of rotary axes (third value of CYCLE832, TA of cycle 32); NaN
+            or inf where the program does not say; None where no dialect says
     """
 
     axes: Axes
@@ -181,7 +181,7 @@ class MotionBlocks:
 
     @property
     def arms(self) -> Floats:
-        """(A,) mm that a unit of each axis counts in deviations: of rotary axes the tolerance over the one of turns where the
+        """(A,) mm that a unit of each axis counts in deviations: of rotary axes the tolerance over that of turns where the
         program states both (the median), else ARM."""
         arm, blended = ARM, self.path == CornerMode.BLEND
         if self.turn_tolerance is not None and blended.any():

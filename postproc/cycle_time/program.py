@@ -13,7 +13,17 @@ from postproc.cycle_time.blocks import OFF, Axes, Cause, CornerMode, MotionBlock
 from postproc.cycle_time.shape import NOTHING, shape
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import arc_sweeps, coordinates, positions
-from postproc.readback.text.canonical import CURVE, LOADED, OFFSET, REGISTER, REST, SMOOTH, SMOOTH_AXIS, SMOOTH_LEVEL, Canonical
+from postproc.readback.text.canonical import (
+    CURVE,
+    LOADED,
+    OFFSET,
+    REGISTER,
+    REST,
+    SMOOTH,
+    SMOOTH_AXIS,
+    SMOOTH_LEVEL,
+    Canonical,
+)
 from postproc.readback.text.clamps import closing, opening
 from postproc.readback.text.modal import columns, fill_values, modal_state
 from postproc.readback.text.words import Words
