@@ -119,8 +119,11 @@ def _fast_blocks(w: Walked, rows: Array, pace: Array, tolerance: float) -> Array
 def _groups(check: Array, feed: Array) -> Array:
     """(M,) number of the feed of each target, from 1; 0 for what is not compared."""
     result = np.zeros(len(feed), np.int64)
-    if check.any():
-        result[check] = 1 + np.unique(feed[check], return_inverse=True)[1]
+    values = feed[check]
+    if len(values):
+        new = np.flatnonzero(np.append(True, values[1:] != values[:-1]))
+        number = np.unique(values[new], return_inverse=True)[1]
+        result[check] = 1 + np.repeat(number, np.diff(np.append(new, len(values))))
     return result
 
 
