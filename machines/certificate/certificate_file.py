@@ -68,9 +68,11 @@ def geometry_table(legs: LegGeometry, asked: AskedProof) -> dict[str, Any]:
                 "direction": legs.directions[k].tolist(), "arm": legs.arms[k].tolist(), "joint": legs.joints[k].tolist(),
                 "rod": float(legs.lengths[k]), "root": float(legs.roots[k]), "pair": legs.pairs[k].tolist(),
                 "travel": _ends(asked.travel[k])} | (
-                    {} if legs.kept is None else {"bar": legs.bars[k], "kept": legs.kept[k].tolist()})
-    return {"freedoms": list(legs.freedoms), "gauge": legs.gauge.tolist(), "legs": [of(k) for k in range(len(legs.names))],
-            "parts": None if asked.parts is None else _parts(asked.parts),
+                    {} if legs.kept is None else {"bar": legs.bars[k], "kept": legs.kept[k].tolist()}) | (
+                    {} if legs.rings is None or not legs.rings[k] else {"ring": float(legs.rings[k])})
+    besides = {} if legs.holds is None else {"bed": legs.holds.of_bed, "platform": legs.holds.of_platform}
+    return {"freedoms": list(legs.free or legs.freedoms), **besides, "gauge": legs.gauge.tolist(),
+            "legs": [of(k) for k in range(len(legs.names))], "parts": None if asked.parts is None else _parts(asked.parts),
             "carriers": [{"letter": name, "direction": row.tolist(), "travel": _ends(travel)} for name, row, travel in zip(
                 legs.carrier_names, legs.carriers, asked.carrier_travel, strict=True)]}
 
