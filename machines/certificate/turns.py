@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from machines.certificate.spans import Span, spanned, stacked, turned_by
+from machines.kinematics.leg_geometry import TurnLetters
 from toolpaths.arrays import Floats
 
 
-def least_turns(turns: str, pose: Span) -> tuple[Span, Span]:
+def least_turns(turns: TurnLetters, pose: Span) -> tuple[Span, Span]:
     """(R (N, 3, 3), its derivatives by tilt and heading (N, 2, 3, 3)) of poses (N, 5), of a platform of such turns."""
     n = len(pose.lo)
     c, s = turned_by(pose[:, 3])

@@ -18,7 +18,6 @@ Tricept robot: inverse kinematics, manipulability analysis and closed-loop direc
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -55,16 +54,6 @@ class Holds:
     def count(self) -> int:
         """H = A + S"""
         return len(self.normals) + len(self.across)
-
-    @property
-    def of_bed(self) -> list[dict[str, Any]]:
-        """The planes of the bed one by one."""
-        return _each(normal=self.normals, point=self.points, joint=self.joints, moves=self.moves)
-
-    @property
-    def of_platform(self) -> list[dict[str, Any]]:
-        """The planes of the platform one by one."""
-        return _each(across=self.across, through=self.through, apart=self.apart)
 
     def gaps(self, place: Floats, turn: Floats) -> Floats:
         """(N, H) mm: what each equation misses 0 by."""
@@ -114,11 +103,6 @@ class Holds:
         e = np.concatenate([np.broadcast_to(self.normals, (n, *self.normals.shape)), self.across @ back], axis=1)
         arms = np.concatenate([self.joints @ back, self.through - place[:, None]], axis=1)
         return e, arms
-
-
-def _each(**columns: Floats) -> list[dict[str, Any]]:
-    rows = zip(*(value.tolist() for value in columns.values()), strict=True)
-    return [dict(zip(columns, row, strict=True)) for row in rows]
 
 
 def hinges(normals: Floats, points: Floats, joints: Floats) -> Holds:

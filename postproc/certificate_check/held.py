@@ -21,6 +21,7 @@ import numpy as np
 from postproc.certificate_check.balls import Ball, FloatArray, ball, cos_sin, product, scalar, vector
 
 Vectors = list[Ball]
+"""three components"""
 STEPS, TRIES, WIDER = 20, 4, 1.4
 """of Newton to S0; distances that are tried; how much wider each is"""
 LEAST = 0.05
@@ -128,11 +129,11 @@ def _standing(geometry: dict[str, Any], shift: FloatArray, p: list[Ball]) -> Sta
                             _carried(geometry, shift, p, c, r), moved)
 
 
-Asked = tuple[dict[str, Any], FloatArray, list[Ball]]
+GivenPoses = tuple[dict[str, Any], FloatArray, list[Ball]]
 """geometry, from the point of the region to the reference point, five numbers"""
 
 
-def _twists(asked: Asked, start: tuple[FloatArray, FloatArray], within: tuple[FloatArray, FloatArray],
+def _twists(asked: GivenPoses, start: tuple[FloatArray, FloatArray], within: tuple[FloatArray, FloatArray],
             near: FloatArray, gap: Ball) -> tuple[Ball, Ball]:
     """(twists (N, 6, 5) by the five numbers, twist (N, 6) that takes `gap` off) anywhere `within` (N, 6) of the start.
 

@@ -13,10 +13,7 @@ from typing import Any
 import numpy as np
 
 from postproc.certificate_check.balls import Ball, FloatArray, ball, cos_sin, scalar, vector
-from postproc.certificate_check.held import PoseBalls, hold_rows, on_ring, turned
-
-Vectors = list[Ball]
-"""three components"""
+from postproc.certificate_check.held import PoseBalls, Vectors, hold_rows, on_ring, turned
 
 
 @dataclass(frozen=True, eq=False)

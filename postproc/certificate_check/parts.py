@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from postproc.certificate_check.balls import Ball, FloatArray, ball, scalar
-from postproc.certificate_check.held import PoseBalls
-from postproc.certificate_check.legs import Bounds, Vectors, carried
+from postproc.certificate_check.held import PoseBalls, Vectors
+from postproc.certificate_check.legs import Bounds, carried
 
 ONE_JOINT = 1e-6
 """mm: platform ends of rods nearer than this are one joint"""
