@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from machines.key_problem import KeyProblem
-from machines.kinematics.legs.holds import Holds, hinges, telescope, together, untwisted
+from machines.kinematics.holds import Holds, hinges, telescope, together, untwisted
 from machines.models import Interval, Vector
 from machines.user_model import UserModel
 from toolpaths.units import DEG

@@ -43,7 +43,7 @@ BORDERS = {
     **{f"{name}.py": CERTIFICATES for name in (
         "machines/analysis/certificate_figure", "machines/certificate/certificate_file", "machines/certificate/lookup",
         "postproc/certificate_check/check", "postproc/certificate_check/chains", "postproc/certificate_check/legs",
-        "postproc/certificate_check/parts", "postproc/certificate_check/machine_file",
+        "postproc/certificate_check/held", "postproc/certificate_check/parts", "postproc/certificate_check/machine_file",
         "postproc/certificate_check/run")},
     **{f"postproc/dossier/{name}.py": FIGURES for name in ("content", "page", "words")},
     "machines/analysis/levers.py": FIGURES, "machines/analysis/sizes.py": FIGURES, "machines/analysis/star.py": FIGURES,

@@ -93,6 +93,10 @@ def studied(machine: Machine, measure: MapMeasure) -> StudiedLegs:
     if machine.kinematics.transmits is None or legs is None or parts is None:
         raise DiagnosticError([error("analysis.map", f"{machine.name} has no legs: its slides pass their speed on as it is",
                                      file=machine.file, hint="leave --map out: machine analyse has the indices of a chain")])
+    if legs.holds is not None:
+        raise DiagnosticError([error("analysis.map", f"some motions of {machine.name} follow from what holds its platform "
+                                     "besides the legs: its measures are not mapped", file=machine.file,
+                                     hint="leave --map out: machine analyse has the extremes over its workspace")])
     slides = bool(legs.slide.all()) and not legs.turns
     if (measure == "acceleration" and not slides) or (measure.startswith("rod") and not legs.plain):
         what = "slides under a platform that only translates" if measure == "acceleration" else \

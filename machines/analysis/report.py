@@ -100,7 +100,7 @@ def _transmission(kinematics: Transmission, legs: LegGeometry | None) -> dict[st
         "force_transmission": _largest(force_transmission, kinematics, several),
         "manipulability": _largest(manipulability, kinematics, several),
         "conditioning_factor": _least(conditioning_factor, kinematics, several)}
-    over = None if legs is None else rates_over(legs, kinematics.lever)
+    over = None if legs is None or legs.holds is not None else rates_over(legs, kinematics.lever)
     for key, measure in MEASURES.items():
         if over is None:
             break

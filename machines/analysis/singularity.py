@@ -108,7 +108,7 @@ def annex_d_boxes(legs: LegGeometry, margin: float) -> tuple[float, float] | Non
     `margin` by the longest b is at least margin / sqrt 2 by s. None of machines whose legs do not change their length, or
     where a pose looked at is not above it.
     """
-    if (legs.slide | legs.arm).any() or not legs.tilts_everywhere:
+    if (legs.slide | legs.arm).any() or not legs.tilts_everywhere or legs.holds is not None:
         return None
     space, poses = legs.workspace, PosesOfBoxes(legs, np.zeros(3))
     low, high = np.array([*space.lower, space.tilt[0], 0.0]), np.array([*space.upper, space.tilt[1], 2.0 * np.pi])

@@ -17,6 +17,7 @@ import numpy as np
 from machines.certificate.clearances import PartsOfLegs
 from machines.certificate.lookup import WHOLE, key_of
 from machines.certificate.search import GAPS, NAMES, AskedProof, ProvedBoxes
+from machines.kinematics.holds import Holds
 from machines.kinematics.leg_geometry import LegGeometry
 from toolpaths.arrays import Floats
 from toolpaths.dataclass import dataclass
@@ -68,11 +69,22 @@ def geometry_table(legs: LegGeometry, asked: AskedProof) -> dict[str, Any]:
                 "direction": legs.directions[k].tolist(), "arm": legs.arms[k].tolist(), "joint": legs.joints[k].tolist(),
                 "rod": float(legs.lengths[k]), "root": float(legs.roots[k]), "pair": legs.pairs[k].tolist(),
                 "travel": _ends(asked.travel[k])} | (
-                    {} if legs.kept is None else {"bar": legs.bars[k], "kept": legs.kept[k].tolist()})
-    return {"freedoms": list(legs.freedoms), "gauge": legs.gauge.tolist(), "legs": [of(k) for k in range(len(legs.names))],
-            "parts": None if asked.parts is None else _parts(asked.parts),
+                    {} if legs.kept is None else {"bar": legs.bars[k], "kept": legs.kept[k].tolist()}) | (
+                    {} if legs.rings is None or not legs.rings[k] else {"ring": float(legs.rings[k])})
+    besides = {} if legs.holds is None else _planes(legs.holds)
+    return {"freedoms": list(legs.free or legs.freedoms), **besides, "gauge": legs.gauge.tolist(),
+            "legs": [of(k) for k in range(len(legs.names))], "parts": None if asked.parts is None else _parts(asked.parts),
             "carriers": [{"letter": name, "direction": row.tolist(), "travel": _ends(travel)} for name, row, travel in zip(
                 legs.carrier_names, legs.carriers, asked.carrier_travel, strict=True)]}
+
+
+def _planes(holds: Holds) -> dict[str, Any]:
+    """Planes of the bed and of the platform that hold it, one by one."""
+    def each(**columns: Floats) -> list[dict[str, Any]]:
+        rows = zip(*(value.tolist() for value in columns.values()), strict=True)
+        return [dict(zip(columns, row, strict=True)) for row in rows]
+    return {"bed": each(normal=holds.normals, point=holds.points, joint=holds.joints, moves=holds.moves),
+            "platform": each(across=holds.across, through=holds.through, apart=holds.apart)}
 
 
 def _parts(parts: PartsOfLegs) -> dict[str, Any]:

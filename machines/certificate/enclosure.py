@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from machines.certificate.following import following
 from machines.certificate.poses import PosesOfBoxes
 from machines.certificate.spans import Span, angle_of, crossed, dotted, joined, spanned, stacked, turned_by
 from machines.kinematics.leg_geometry import LegGeometry
@@ -34,7 +35,8 @@ class Enclosure:
         cosine: (N, K)
         cosine_change: (N, 5, K) by the five numbers of a pose
         q: (N, K) mm or rad
-        matrix, change: (N, R, 6 + bars) and by the five numbers of a pose (N, 5, R, 6 + bars): legs, then pairs
+        matrix, change: (N, R, 6 + bars) and by the five numbers of a pose (N, 5, R, 6 + bars): legs, what holds the platform
+            besides, then pairs
         rods, rods_by: (N, K, 3) r / l, and by the five numbers (N, 5, K, 3)
     """
 
@@ -70,6 +72,10 @@ def enclosed(poses: PosesOfBoxes, pose: Span) -> Enclosure:
             whole, whole_by = (_pairs_of_bars(legs, one, paired) for one in (held, held_by))
             rows.append(joined([held * 0.0, whole], -1))
             changes.append(joined([held_by * 0.0, whole_by], -1))
+        if poses.follows is not None:
+            held, held_by = poses.follows.rows(following(poses.follows, pose))
+            rows.insert(1, held)
+            changes.insert(1, held_by)
         cosine_by = stacked([one[5] for one in each], 2)
         return Enclosure(under, cosine, cosine_by, q, joined(rows, 1), joined(changes, 2), along, along_by)
 
@@ -164,6 +170,11 @@ def _length(legs: LegGeometry, k: int, w: Span, by: Span) -> LegSpans:
     return square, one, long - float(legs.lengths[k]), along, along_by, spanned(np.zeros_like(rate.lo))
 
 
+def set_rows(legs: LegGeometry) -> int:
+    """Rows of the matrices that set the platform's freedoms: legs, and what holds it besides."""
+    return len(legs.names) + (0 if legs.holds is None else legs.holds.count)
+
+
 def columns(legs: LegGeometry) -> tuple[list[int], list[int]]:
     """Columns of the matrices: of the freedoms, and of all motions that legs and pairs must hold.
 
@@ -171,7 +182,7 @@ def columns(legs: LegGeometry) -> tuple[list[int], list[int]]:
     """
     free = [FREEDOMS.index(letter) for letter in legs.freedoms]
     every = ([0, 1, 2, 3, 4, 5] if "z" in legs.freedoms else [0, 1, 5]) + list(range(6, 6 + bar_count(legs)))
-    return free, every if len(legs.names) + int(legs.pairs.any(axis=1).sum()) >= len(every) else free
+    return free, every if set_rows(legs) + int(legs.pairs.any(axis=1).sum()) >= len(every) else free
 
 
 def least_singular(middle: Floats, change: Span, half: Floats) -> tuple[Floats, Floats, Floats]:

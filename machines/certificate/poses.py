@@ -4,7 +4,8 @@ A pose is (x, y, z, tilt, heading): mm, rad. The turn is the least one that take
 machine's inverse takes it; of a platform that turns about z alone `tilt` is that turn. With d from the point asked for to
 the reference point, platform level, that stands at C = p + R d; of a platform that does not turn slides that carry it take
 the part of p that it cannot move by itself, and where they are redundant poses are those seen from the carriers. Joints on
-a bar, which keeps its direction, are at C + R b + k.
+a bar, which keeps its direction, are at C + R b + k. Of a platform of which something follows C and R are those of
+`following.py`.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ from functools import cached_property
 
 import numpy as np
 
-from machines.certificate.spans import Span, joined, spanned, stacked, turned_by
+from machines.certificate.following import FollowingMotion, following
+from machines.certificate.spans import Span, dotted, joined, spanned
+from machines.certificate.turns import applied, least_turns
 from machines.kinematics.leg_geometry import LegGeometry
 from toolpaths.arrays import Floats
 from toolpaths.dataclass import dataclass
@@ -48,33 +51,32 @@ class PosesOfBoxes:
         return np.asarray(self.moves[:, :free] @ parts[:free]), parts[free:]
 
     def turn(self, pose: Span) -> tuple[Span, Span]:
-        """(R (N, 3, 3), its derivatives by tilt and heading (N, 2, 3, 3)) of poses (N, 5)."""
-        n = len(pose.lo)
-        c, s = turned_by(pose[:, 3])
-        if self.legs.turns == "c":
-            return _about_z(c, s)
-        heading = {"a": spanned(np.full(n, -0.5 * np.pi)), "b": spanned(np.zeros(n))}.get(self.legs.turns, pose[:, 4])
-        ch, sh = turned_by(heading)
-        none, left = spanned(np.zeros(n)), spanned(1.0) - c
+        """(R (N, 3, 3), its derivatives by tilt and heading (N, 2, 3, 3)) of poses (N, 5), nothing following."""
+        return least_turns(self.legs.turns, pose)
 
-        def of(a: Span, b: Span, fixed: float) -> Span:
-            """fixed I + a K + b K^2, K = (0, 0, ch; 0, 0, sh; -ch, -sh, 0), which turns z towards the heading."""
-            across = ch * sh * b
-            return stacked([spanned(fixed) - ch.square() * b, -across, ch * a, -across, spanned(fixed) - sh.square() * b,
-                            sh * a, -(ch * a), -(sh * a), spanned(fixed) - b], -1).reshape(n, 3, 3)
+    @cached_property
+    def follows(self) -> FollowingMotion | None:
+        """What follows from the pose, of a platform that something holds besides its legs."""
+        return None if self.legs.holds is None else FollowingMotion(self.legs, self.from_point)
 
-        double, flat = ch * sh * left * 2.0, (ch.square() - sh.square()) * left
-        by_heading = stacked([double, -flat, -(sh * s), -flat, -double, ch * s, sh * s, -(ch * s), none], -1)
-        return of(s, left, 1.0), stacked([of(c, s, 0.0), by_heading.reshape(n, 3, 3)], 1)
+    def carriers(self, pose: Span) -> Span | None:
+        """(N, M) travel of the carriers, of a platform of which something follows; of others it is linear (`split`)."""
+        return None if self.follows is None else following(self.follows, pose).carried
 
     def ends(self, pose: Span) -> tuple[Span, Span, Span, Span]:
         """(B (N, K, 3), dB (N, 5, K, 3), arms R b (N, K, 3), their derivatives (N, 5, K, 3)), mm, of poses (N, 5)."""
         end, by, arms, arms_by = self.carried(pose, self.legs.joints)
+        if self.legs.rings is not None:
+            return self._on_rings(pose, end, by, (arms, arms_by))
         return (end if self.legs.kept is None else end + self.legs.kept), by, arms, arms_by
 
     def carried(self, pose: Span, points: Floats) -> tuple[Span, Span, Span, Span]:
         """The same of any points (K, 3) of the platform, from its reference point as it stands level."""
         n, count = len(pose.lo), len(points)
+        if self.follows is not None:
+            there = following(self.follows, pose)
+            arms, arms_by = applied(there.turn, points), applied(there.turn_by, points)
+            return there.place[:, None] + arms, there.place_by[:, :, None] + arms_by, arms, arms_by
         place = pose[:, :3].by(self.split[0])
         linear = spanned(np.broadcast_to(self.split[0].T[None, :, None, :], (n, 3, count, 3)))
         if not self.legs.turns:
@@ -83,22 +85,24 @@ class PosesOfBoxes:
             none = spanned(np.zeros((n, 5, count, 3)))
             return place[:, None, :] + (arms + shift), joined([linear, spanned(np.zeros((n, 2, count, 3)))], 1), arms, none
         turn, by = self.turn(pose)
-        arms, changes = _applied(turn, points), _applied(by, points)
+        arms, changes = applied(turn, points), applied(by, points)
         whole = points + self.from_point
-        far, far_changes = _applied(turn, whole), _applied(by, whole)
+        far, far_changes = applied(turn, whole), applied(by, whole)
         still = spanned(np.zeros((n, 3, count, 3)))
         return place[:, None, :] + far, joined([linear, far_changes], 1), arms, joined([still, changes], 1)
 
-
-def _about_z(c: Span, s: Span) -> tuple[Span, Span]:
-    """(R (N, 3, 3), its derivatives by tilt and heading (N, 2, 3, 3)) of turns about z with that cosine and sine (N,)."""
-    n = len(c.lo)
-    none, one = spanned(np.zeros(n)), spanned(np.ones(n))
-    turn = stacked([c, -s, none, s, c, none, none, none, one], -1).reshape(n, 3, 3)
-    by_turn = stacked([-s, -c, none, c, -s, none, none, none, none], -1).reshape(n, 3, 3)
-    return turn, stacked([by_turn, by_turn * 0.0], 1)
-
-
-def _applied(turn: Span, vectors: Floats) -> Span:
-    """(..., K, 3): turns (..., 3, 3) of vectors (K, 3)."""
-    return (turn[..., None, :, :] * vectors[:, None, :]).sum(-1)
+    def _on_rings(self, pose: Span, end: Span, by: Span, arms: tuple[Span, Span]) -> tuple[Span, Span, Span, Span]:
+        """What `ends` gives of legs that end on rings about z of the platform, round ends (N, K, 3), where these are nearest
+        to the feet: by d, from the end to the foot, the part a of it across z, and a / |a|."""
+        _, _, z, z_by = self.carried(pose, np.tile([0.0, 0.0, 1.0], (len(self.legs.names), 1)))
+        rings = self.legs.rings
+        assert rings is not None
+        apart = -(end - self.legs.points)
+        high, high_by = dotted(apart, z), dotted(apart[:, None], z_by) - dotted(by, z[:, None])
+        aside = apart - high[..., None] * z
+        aside_by = -by - high_by[..., None] * z[:, None] - high[:, None, :, None] * z_by
+        far = aside.square().sum(-1).root()
+        out = aside.over(far[..., None])
+        out_by = (aside_by - dotted(out[:, None], aside_by)[..., None] * out[:, None]).over(far[:, None, :, None])
+        shift, shift_by = out * rings[:, None], out_by * rings[:, None]
+        return end + shift, by + shift_by, arms[0] + shift, arms[1] + shift_by

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from machines.certificate.clearances import Gaps, PartsOfLegs, gaps
-from machines.certificate.enclosure import columns, enclosed, least_singular
+from machines.certificate.enclosure import columns, enclosed, least_singular, set_rows
 from machines.certificate.poses import PosesOfBoxes
 from machines.certificate.spans import Span, spanned
 from toolpaths.arrays import Bools, Floats
@@ -127,7 +127,7 @@ def look(asked: AskedProof, pose: Span) -> Looked:
     over = enclosed(asked.poses, pose)
     reaches, reaches_at = (np.asarray((one.under.lo > 0.0).all(axis=1), dtype=np.bool_) for one in (over, here))
     free, held = columns(legs)
-    count = len(legs.names)
+    count = set_rows(legs)
     half = pose.radius
     direct = least_singular(here.matrix.lo[:, :count][:, :, free], over.change[:, :, :count][:, :, :, free], half)
     whole = least_singular(here.matrix.lo[:, :, held], over.change[:, :, :, held], half)
@@ -137,6 +137,11 @@ def look(asked: AskedProof, pose: Span) -> Looked:
     spread = half * over_ends(asked, pose)
     share = np.where(np.isfinite(direct[2]) & np.isfinite(whole[2]), direct[2] + whole[2] + 1e-3 * spread, spread)
     left, left_at = _travel_left(asked, here.q, over.q)
+    if (carried := asked.poses.carriers(pose)) is not None and len(legs.carriers):
+        carried_at = asked.poses.carriers(spanned(pose.middle))
+        assert carried_at is not None
+        own, own_at = (_carriers_left(asked, one) for one in (carried, carried_at))
+        left, left_at = np.minimum(left, own), np.minimum(left_at, own_at)
     apart = None
     if asked.parts is not None:
         apart = gaps(asked.poses, asked.parts, pose, here, over)
@@ -148,8 +153,12 @@ def look(asked: AskedProof, pose: Span) -> Looked:
 def over_ends(asked: AskedProof, pose: Span) -> Floats:
     """(N, 5) mm that the platform joints move at most, per number of the pose, relative to the longest rod."""
     _, by, _, _ = asked.poses.ends(pose)
+    if asked.poses.follows is not None:  # where nothing is proved of a box, as in its middle
+        _, at, _, _ = asked.poses.ends(spanned(pose.middle))
+        known = np.isfinite(by.lo) & np.isfinite(by.hi)
+        by = Span(*(np.where(known, end, np.nan_to_num(rest)) for end, rest in ((by.lo, at.lo), (by.hi, at.hi))))
     most = np.sqrt((np.maximum(np.abs(by.lo), np.abs(by.hi)) ** 2).sum(axis=3)).max(axis=2)
-    return np.asarray(most / asked.poses.legs.lengths.max(), dtype=np.float64)
+    return np.asarray(most / (asked.poses.legs.lengths.max() or asked.poses.legs.lever), dtype=np.float64)
 
 
 def _travel_left(asked: AskedProof, here: Span, over: Span) -> tuple[Floats, Floats]:
@@ -159,6 +168,12 @@ def _travel_left(asked: AskedProof, here: Span, over: Span) -> tuple[Floats, Flo
     left = np.minimum(over.lo - turns - low, high - over.hi + turns).min(axis=1)
     left_at = np.minimum(here.lo - turns - low, high - here.lo + turns).min(axis=1)
     return np.nan_to_num(left, nan=-np.inf), np.nan_to_num(left_at, nan=-np.inf)
+
+
+def _carriers_left(asked: AskedProof, over: Span) -> Floats:
+    """(N,) least distance of a carrier from its ends of travel."""
+    low, high = asked.carrier_travel.T
+    return np.asarray(np.nan_to_num(np.minimum(over.lo - low, high - over.hi).min(axis=1), nan=-np.inf))
 
 
 def prove(asked: AskedProof) -> ProvedBoxes:
@@ -197,7 +212,7 @@ def _looks(asked: AskedProof) -> Floats:
 
 def _carried(asked: AskedProof) -> ProvedBoxes | None:
     """A corner of the region where a carrier would be outside its travel; what it does is linear in the pose."""
-    if asked.poses.legs.carried_twice:
+    if asked.poses.legs.carried_twice or asked.poses.follows is not None:
         return None
     shift = asked.poses.from_point
     corners = np.stack(np.meshgrid(*zip(asked.lower[:3], asked.upper[:3], strict=True)), axis=-1).reshape(-1, 3)

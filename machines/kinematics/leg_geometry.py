@@ -9,6 +9,7 @@ from typing import Literal, cast
 
 import numpy as np
 
+from machines.kinematics.holds import Holds
 from machines.kinematics.workspace import Workspace
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.dataclass import dataclass
@@ -20,7 +21,7 @@ TurnLetters = Literal["", "a", "b", "c", "abc"]
 
 @dataclass(frozen=True, eq=False)
 @arrays(points="K 3", directions="K 3", arms="K 3", lengths="K", roots="K", slide="K", arm="K", joints="K 3", pairs="K 3",
-        gauge="3", carriers="M 3", kept="K 3")
+        gauge="3", carriers="M 3", kept="K 3", rings="K")
 class LegGeometry:
     """K legs under a platform, in the machine frame, mm.
 
@@ -42,6 +43,9 @@ class LegGeometry:
         kept: (K, 3) mm from the hinge of a bar, which keeps its direction, to the joint of its leg; `joints` are then the
             hinges. None without bars
         bars: the number of the bar that each leg holds, -1 of none; () without bars
+        holds: what holds the platform besides legs and pairs: all six are then its freedoms, of which some follow
+        free: those that the drives set by themselves where others follow; () all
+        rings: (K,) mm about z of the platform, round the joints, on whose nearest points the legs end; None without any
     """
 
     names: tuple[str, ...]
@@ -62,6 +66,9 @@ class LegGeometry:
     head: bool = False
     kept: Floats | None = None
     bars: tuple[int, ...] = ()
+    holds: Holds | None = None
+    free: tuple[str, ...] = ()
+    rings: Floats | None = None
 
     @property
     def turns(self) -> TurnLetters:
@@ -74,14 +81,19 @@ class LegGeometry:
         return len(self.turns) == len("abc")
 
     @property
+    def axis_asked(self) -> bool:
+        """False of a platform whose turns all follow from its place."""
+        return bool(self.turns) and (not self.free or bool(set(self.free) & set("abc")))
+
+    @property
     def carried_twice(self) -> bool:
         """True where carriers move the tool where the platform moves it too: poses are those seen from the carriers."""
-        return bool(self.carrier_names) and set("xyz") <= set(self.freedoms)
+        return bool(self.carrier_names) and set("xyz") <= set(self.free or self.freedoms)
 
     @property
     def plain(self) -> bool:
         """True without bars, a turn about z alone, and carriers that are redundant."""
-        return self.kept is None and self.turns != "c" and not self.carried_twice
+        return self.kept is None and self.turns != "c" and not self.carried_twice and self.holds is None
 
     @property
     def lever(self) -> float:

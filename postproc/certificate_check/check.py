@@ -13,12 +13,15 @@ from hashlib import sha256
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from postproc.certificate_check.balls import Ball, FloatArray, ball, product, spectral
 from postproc.certificate_check.boxes import Rejected, StatedBox, covering, halves
+from postproc.certificate_check.held import held, pose_of
 from postproc.certificate_check.legs import legs_in, moving
 from postproc.certificate_check.parts import apart
 
+BoolArray = NDArray[np.bool_]
 DEEPEST, AT_ONCE = 14, 1_000
 """cuts of a box of the file; boxes at a time"""
 LETTERS = "xyztn"
@@ -148,22 +151,24 @@ def _looked(found: dict[str, Any], shift: FloatArray, lower: FloatArray, upper: 
     geometry = found["geometry"]
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
     radius = half * (1.0 + 1e-12) + 1e-12 * np.abs(middle)
-    poses = [ball(middle[:, i]) for i in range(5)], [Ball(middle[:, i], radius[:, i]) for i in range(5)]
+    numbers = [ball(middle[:, i]) for i in range(5)], [Ball(middle[:, i], radius[:, i]) for i in range(5)]
+    poses = pose_of(geometry, shift, numbers[0]), pose_of(geometry, shift, numbers[1])
     here, over = (legs_in(geometry, shift, pose) for pose in poses)
-    count = len(geometry["legs"])
-    free = ["xyzabc".index(letter) for letter in geometry["freedoms"]]
-    held = [0, 1, 2, 3, 4, 5] if "z" in geometry["freedoms"] else [0, 1, 5]
-    held += range(6, len(here.rows[0]))
-    held = held if len(here.rows) >= len(held) else free  # the file states too few rods to hold more
+    count, free, every = _counted(geometry, here.rows)
     matrix, rates = _matrix(here.rows), [_matrix([row[i] for row in over.rates]) for i in range(5)]
     direct = _least(matrix[:, :count][:, :, free], [rate[:, :count][:, :, free] for rate in rates], radius)
-    whole = _least(matrix[:, :, held], [rate[:, :, held] for rate in rates], radius)
+    whole = _least(matrix[:, :, every], [rate[:, :, every] for rate in rates], radius)
     cosine = np.min([one.least() for one in over.cosine], axis=0)
     reaches = np.all([one.least() > 0.0 for one in over.under], axis=0)
     good = reaches & (direct[0] >= stated[:, 0]) & (cosine >= stated[:, 1]) & (whole[0] >= stated[:, 2])
     inside, outside = _travel(found, here.q, over.q)
     at = np.stack([direct[1], np.min([one.most() for one in here.cosine], axis=0), whole[1]], axis=1)
-    share = np.where(np.isfinite(direct[2] + whole[2]), direct[2] + whole[2], half)
+    least_known = half if poses[1].standing is None else poses[1].standing.moved
+    share = np.where(np.isfinite(direct[2] + whole[2]), direct[2] + whole[2], least_known)
+    if poses[1].standing is not None and poses[0].standing is not None and found["travel_proved"] is True:
+        within, beyond = _carriers_here(geometry, poses[0].standing.carried, poses[1].standing.carried)
+        inside, outside = inside & within, outside | beyond
+        share = np.where((good & ~within)[:, None], poses[1].standing.moved, share)
     if geometry["parts"] is not None:
         gap, gap_at, moved = apart(geometry, shift, poses, here, over, half)
         only = good & (gap < stated[:, 3:]).any(axis=1) & (moved.sum(axis=1) > 0.0)
@@ -172,6 +177,28 @@ def _looked(found: dict[str, Any], shift: FloatArray, lower: FloatArray, upper: 
     against = [_against(at[k], stated[k], bool(outside[k]), bool(np.any([one.most()[k] < 0.0 for one in here.under])))
                for k in range(len(lower))]
     return good & inside, against, np.where(half > 0.0, share, -1.0).argmax(axis=1)
+
+
+def _counted(geometry: dict[str, Any], rows: list[list[Ball]]) -> tuple[int, list[int], list[int]]:
+    """(rows that set the platform's freedoms, columns of these, columns of all motions that must be held)."""
+    if held(geometry):
+        count, free = len(geometry["legs"]) + len(geometry["bed"]) + len(geometry["platform"]), list(range(6))
+    else:
+        count, free = len(geometry["legs"]), ["xyzabc".index(letter) for letter in geometry["freedoms"]]
+    every = [0, 1, 2, 3, 4, 5] if "z" in geometry["freedoms"] else [0, 1, 5]
+    every += range(6, len(rows[0]))
+    return count, free, every if len(rows) >= len(every) else free  # else the file states too few rods to hold more
+
+
+def _carriers_here(geometry: dict[str, Any], here: list[Ball], over: list[Ball]) -> tuple[BoolArray, BoolArray]:
+    """(inside their travel everywhere (N,), outside in the middle (N,)) of carriers that take up what follows; 1 of none."""
+    n = len(here[0].m) if here else 1
+    inside, outside = np.ones(n, bool), np.zeros(n, bool)
+    for one, at, q in zip(geometry["carriers"], here, over, strict=True):
+        low, high = (sign * np.inf if end is None else float(end) for sign, end in zip((-1, 1), one["travel"], strict=True))
+        inside &= (q.least() >= low) & (q.most() <= high)
+        outside |= (at.most() < low - 1e-9) | (at.least() > high + 1e-9)
+    return inside, outside
 
 
 def _against(at: FloatArray, stated: FloatArray, outside: bool, short: bool) -> str:
@@ -207,7 +234,7 @@ def _least(matrix: Ball, rates: list[Ball], half: FloatArray) -> tuple[FloatArra
     return bound, at, share
 
 
-def _travel(found: dict[str, Any], here: list[Ball], over: list[Ball]) -> tuple[FloatArray, FloatArray]:
+def _travel(found: dict[str, Any], here: list[Ball], over: list[Ball]) -> tuple[BoolArray, BoolArray]:
     """(inside the travel everywhere (N,), outside in the middle (N,)); angles may be counted whole turns apart."""
     inside, outside = np.ones(len(here[0].m), bool), np.zeros(len(here[0].m), bool)
     margin = float(found["travel_margin"])
@@ -224,7 +251,7 @@ def _travel(found: dict[str, Any], here: list[Ball], over: list[Ball]) -> tuple[
 def _carriers(found: dict[str, Any]) -> None:
     """Carriers inside their travel over the whole region; what they do is linear in it."""
     if found["travel_proved"] is not True or not found["geometry"]["carriers"] \
-            or set(found["geometry"]["freedoms"]) >= set("xyz"):  # seen from the carriers, wherever they are
+            or set(found["geometry"]["freedoms"]) >= set("xyz") or held(found["geometry"]):  # seen from them; box by box
         return
     share, shift = moving(found["geometry"])[1], _shift(found["region"], found["geometry"])
     spans = np.array([found["region"][name] for name in SPANS[:3]], np.float64) + shift[:, None]

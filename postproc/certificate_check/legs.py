@@ -13,9 +13,7 @@ from typing import Any
 import numpy as np
 
 from postproc.certificate_check.balls import Ball, FloatArray, ball, cos_sin, scalar, vector
-
-Vectors = list[Ball]
-"""three components"""
+from postproc.certificate_check.held import PoseBalls, Vectors, hold_rows, on_ring, turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +33,9 @@ class Bounds:
     rods_by: list[list[Vectors]]
 
 
-def legs_in(geometry: dict[str, Any], shift: FloatArray, pose: list[Ball]) -> Bounds:
+def legs_in(geometry: dict[str, Any], shift: FloatArray, pose: PoseBalls) -> Bounds:
     """Bounds over poses, five numbers (N,) each; `shift` (3,) leads from the point of the region to the reference point."""
     legs = geometry["legs"]
-    turned, turned_by = _turning(geometry, pose)
     lever = 1.0 / max([1.0, *(math.hypot(*leg["joint"]) for leg in legs)])
     found = Bounds([], [], [], [], [], [], [], [], [])
     bars = 1 + max([-1, *(int(leg.get("bar", -1)) for leg in legs)])
@@ -46,8 +43,14 @@ def legs_in(geometry: dict[str, Any], shift: FloatArray, pose: list[Ball]) -> Bo
     pairs: list[tuple[list[Ball], list[list[Ball]]]] = []
     for leg in legs:
         joint, kept = np.array(leg["joint"], np.float64), [float(v) for v in leg.get("kept", (0.0, 0.0, 0.0))]
-        arm, arm_by = _turn(turned, turned_by, joint, pose[0])
+        arm, arm_by = carried(geometry, shift, pose, joint, moves=False)
         end, by = carried(geometry, shift, pose, joint)
+        if leg.get("ring") and pose.standing is not None:
+            apart = [ball(float(v)) - x for v, x in zip(leg["point"], end, strict=True)]
+            out, out_by = on_ring(pose.standing, float(leg["ring"]), apart, [[-x for x in d] for d in by])
+            arm, end = ([x + y for x, y in zip(v, out, strict=True)] for v in (arm, end))
+            arm_by, by = ([[x + y for x, y in zip(d, e, strict=True)] for d, e in zip(v, out_by, strict=True)]
+                          for v in (arm_by, by))
         end = [x + v for x, v in zip(end, kept, strict=True)]
         w = [end[i] - float(leg["point"][i]) for i in range(3)]
         under, cosine, q, rod, rod_by = _leg(leg, w, by)
@@ -64,7 +67,7 @@ def legs_in(geometry: dict[str, Any], shift: FloatArray, pose: list[Ball]) -> Bo
         found.rows.append(_sum(rod + [m * lever for m in vector(arm, rod)], side[0]))
         none = [arm[0] * 0.0] * 3
         moments = [[x + y for x, y in zip(vector(a, rod), vector(arm, d), strict=True)]
-                   for a, d in zip([none, none, none, *arm_by], rod_by, strict=True)]
+                   for a, d in zip(arm_by, rod_by, strict=True)]
         found.rates.append([_sum(d + [m * lever for m in moment], s)
                             for d, moment, s in zip(rod_by, moments, side_by, strict=True)])
         if any(leg["pair"]):
@@ -72,24 +75,36 @@ def legs_in(geometry: dict[str, Any], shift: FloatArray, pose: list[Ball]) -> Bo
             bar = int(leg.get("bar", -1))
             held = [_swung(vector(r, apart), hinge if bar >= 0 else [], bar, bars, 1.0) for r in (rod, *rod_by)]
             pairs.append((_sum([*none, *none], held[0]), [_sum([*none, *none], h) for h in held[1:]]))
+    besides = [] if pose.standing is None else hold_rows(geometry, pose.standing, lever)
+    own = [pose[0] * 0.0] * bars
+    found.rows.extend(row + own for row, _ in besides)
+    found.rates.extend([rate + own for rate in rates] for _, rates in besides)
     found.rows.extend(row for row, _ in pairs)
     found.rates.extend(rate for _, rate in pairs)
     return found
 
 
-def carried(geometry: dict[str, Any], shift: FloatArray, pose: list[Ball], point: FloatArray, turns: bool = True,
+def carried(geometry: dict[str, Any], shift: FloatArray, pose: PoseBalls, point: FloatArray, turns: bool = True,
             moves: bool = True) -> tuple[Vectors, list[Vectors]]:
     """Where a point (3,) of the platform is, from its reference point as it stands level, and its rates by the five numbers.
 
     Without `turns` a direction at rest, without `moves` a direction that turns with the platform.
     """
-    turned, turned_by = _turning(geometry, pose) if turns else (None, None)
+    if turns and pose.standing is not None:
+        at = pose.standing
+        there = turned(at.turn, point)
+        swung = [vector(w, there) for _, w in at.twists]
+        if not moves:
+            return there, swung
+        return ([x + y for x, y in zip(at.place, there, strict=True)],
+                [[x + y for x, y in zip(v, s, strict=True)] for (v, _), s in zip(at.twists, swung, strict=True)])
+    turning, turning_by = _turning(geometry, pose) if turns else (None, None)
     if not moves:
-        there, by = _turn(turned, turned_by, point, pose[0])
+        there, by = _turn(turning, turning_by, point, pose[0])
         return there, [[pose[0] * 0.0] * 3 for _ in range(3)] + by
     still = _still(geometry)
-    far = point + shift if turned is not None else point + still @ shift
-    end, end_by = _turn(turned, turned_by, far, pose[0])
+    far = point + shift if turning is not None else point + still @ shift
+    end, end_by = _turn(turning, turning_by, far, pose[0])
     place = [sum((pose[j] * float(still[i, j]) for j in range(1, 3)), pose[0] * float(still[i, 0])) for i in range(3)]
     return ([place[i] + end[i] for i in range(3)],
             [[ball(np.full_like(pose[0].m, still[i, j])) for i in range(3)] for j in range(3)] + end_by)
@@ -124,7 +139,7 @@ def moving(geometry: dict[str, Any]) -> tuple[FloatArray, FloatArray]:
     return columns[:, :len(free)] @ shares[:len(free)], shares[len(free):]
 
 
-def _turning(geometry: dict[str, Any], pose: list[Ball]) -> tuple[Any, Any]:
+def _turning(geometry: dict[str, Any], pose: PoseBalls) -> tuple[Any, Any]:
     """(R as 3 x 3 balls, its rates by tilt and heading); None of a platform that does not turn."""
     turns = "".join(sorted(set(geometry["freedoms"]) & set("abc")))
     if not turns:
@@ -154,15 +169,15 @@ def _about_z(angle: Ball) -> tuple[Any, Any]:
     return [[c, -s, zero], [s, c, zero], [zero, zero, one]], [rate, [[zero] * 3] * 3]
 
 
-def _turn(turned: Any, turned_by: Any, v: FloatArray, like: Ball) -> tuple[Vectors, list[Vectors]]:
+def _turn(turning: Any, turning_by: Any, v: FloatArray, like: Ball) -> tuple[Vectors, list[Vectors]]:
     """(R v, its rates by tilt and heading)."""
-    if turned is None:
+    if turning is None:
         none = ball(np.zeros_like(like.m))
         return [ball(np.full_like(like.m, x)) for x in v], [[none] * 3, [none] * 3]
 
     def of(matrix: Any) -> Vectors:
         return [row[0] * float(v[0]) + row[1] * float(v[1]) + row[2] * float(v[2]) for row in matrix]
-    return of(turned), [of(matrix) for matrix in turned_by]
+    return of(turning), [of(matrix) for matrix in turning_by]
 
 
 def _leg(leg: dict[str, Any], w: Vectors, by: list[Vectors]) -> tuple[Ball, Ball, Ball, Vectors, list[Vectors]]:

@@ -12,6 +12,7 @@ import numpy as np
 from postproc.certificate_check.balls import ball
 from postproc.certificate_check.boxes import Rejected
 from postproc.certificate_check.chains import about_chain
+from postproc.certificate_check.held import held, pose_of
 from postproc.certificate_check.legs import carried, legs_in
 from postproc.witness.machine import legs_of
 
@@ -49,7 +50,8 @@ def about(found: dict[str, Any], table: dict[str, Any]) -> None:
         about_chain(found, table)
         return
     kinematics, geometry = table["kinematics"], found["geometry"]
-    if found["region"]["of"] == "tip" and kinematics.get("rotary", {}).get("carries") == "spindle":
+    if found["region"]["of"] == "tip" and (kinematics.get("rotary", {}).get("carries") == "spindle"
+                                           or kinematics.get("spindle_axes")):
         raise Rejected("an axis between platform and spindle moves the tip about: only the platform's places are proved")
     own, given = legs_of(kinematics), geometry["legs"]
     if list(own) != [leg["letter"] for leg in given]:
@@ -64,6 +66,8 @@ def about(found: dict[str, Any], table: dict[str, Any]) -> None:
     for what, value in _of_platform(kinematics).items():
         if not _same(value, geometry[what]):
             raise Rejected(f"{what} is {geometry[what]}, in the machine file {value}")
+    if not _same(_held(kinematics, own), {key: geometry.get(key, []) for key in ("bed", "platform")}):
+        raise Rejected("what holds the platform besides its legs is another in the machine file")
     carriers = {one["letter"]: one for one in geometry["carriers"]}
     if len(carriers) != len(geometry["carriers"]) or set(carriers) != set(kinematics.get("carriers", {})):
         raise Rejected(f"it has carriers {[one['letter'] for one in geometry['carriers']]}, the machine file "
@@ -81,7 +85,7 @@ def _parts(geometry: dict[str, Any], kinematics: dict[str, Any]) -> None:
     """What is held apart, as the machine file has it; where rods stand in the middle is computed from the geometry."""
     given, legs = kinematics.get("clearance", {}), legs_of(kinematics)
     rails = given.get("rail_radius") is not None and all(leg.get("rail_ends") is not None for leg in legs.values())
-    head = kinematics.get("rotary", {}).get("carries") == "spindle"
+    head = kinematics.get("rotary", {}).get("carries") == "spindle" or bool(kinematics.get("spindle_axes"))
     rods = [{"leg": k, "shift": list(shift)} for k, leg in enumerate(legs.values())
             for shift in leg.get("rods") or [(0.0, 0.0, 0.0)]]
     due = {"rod_radius": given.get("rod_radius"), "spindle_radius": None if head else given.get("spindle_radius"),
@@ -103,7 +107,7 @@ def _in_the_middle(geometry: dict[str, Any], space: dict[str, Any]) -> dict[str,
     """Rods and platform joints in the middle of the workspace, as level as the platform can be."""
     low, high = (math.radians(v) for v in space.get("tilt", (0.0, 0.0)))
     number = [0.5 * sum(space[axis]) for axis in "xyz"] + [min(max(0.0, low), high), 0.0]
-    pose = [ball(np.array([v])) for v in number]
+    pose = pose_of(geometry, np.zeros(3), [ball(np.array([v])) for v in number])
     at = legs_in(geometry, np.zeros(3), pose)
     turn = np.array([[x.m[0] for x in carried(geometry, np.zeros(3), pose, e, True, False)[0]] for e in np.eye(3)])
     rods = np.array([[x.m[0] for x in rod] for rod in at.rods])
@@ -126,7 +130,28 @@ def _of_file(leg: dict[str, Any], axis: dict[str, Any], drive: str, side: tuple[
     return {"drive": leg.get("drive", "slide"), "point": list(leg.get("slide", leg.get("point", (0, 0, 0)))),
             "direction": _unit(leg.get("direction", (0, 0, 1))), "arm": list(leg["arm"]) if drive == "arm" else [0.0] * 3,
             "joint": list(leg.get("joint", (0, 0, 0))), "rod": leg["rod"], "root": leg.get("root", 1), "pair": pair,
-            "travel": _travel(axis, drive), **bar}
+            "travel": _travel(axis, drive), **bar, **({"ring": leg["ring"]} if leg.get("ring") else {})}
+
+
+def _held(kinematics: dict[str, Any], legs: dict[str, dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
+    """Planes of the bed and of the platform by which passive legs, hinges and rings hold it."""
+    size = max([1.0, *(math.hypot(*leg.get("joint", (0.0, 0.0, 0.0))) for leg in legs.values())])
+    bed, platform = list[dict[str, Any]](), list[dict[str, Any]]()
+    for one in kinematics.get("passive", {}).values():
+        line, hinge = np.array(_unit(one.get("line", (0.0, 0.0, 1.0)))), np.array(_unit(one["hinge"]))
+        inner = np.cross(line, hinge)
+        bed.append({"normal": hinge, "point": [0.0] * 3, "joint": size * inner, "moves": 0.0})
+        platform += [{"across": u, "through": one["point"], "apart": float(u @ np.array(one.get("joint", (0.0, 0.0, 0.0))))}
+                     for u in (inner, np.cross(line, inner))]
+    bed += [{"normal": _unit(leg["hinge"]), "point": leg.get("slide", leg.get("point")), "joint": leg["joint"], "moves": 1.0}
+            for leg in legs.values() if leg.get("hinge")]
+    if any(leg.get("ring") for leg in legs.values()):
+        bed.append({"normal": (0.0, 1.0, 0.0), "point": [0.0] * 3, "joint": (size, 0.0, 0.0), "moves": 0.0})
+    return {"bed": [_plain(one) for one in bed], "platform": [_plain(one) for one in platform]}
+
+
+def _plain(table: dict[str, Any]) -> dict[str, Any]:
+    return {key: np.asarray(v, np.float64).tolist() for key, v in table.items()}
 
 
 def _sides(kinematics: dict[str, Any]) -> dict[str, tuple[float, float]]:
@@ -157,7 +182,8 @@ def _whole(found: dict[str, Any], kinematics: dict[str, Any]) -> None:
     if found["covers"] != "workspace":
         return
     region, space = found["region"], kinematics["workspace"]
-    moves = {*found["geometry"]["freedoms"], *("z" for one in found["geometry"]["carriers"] if one["direction"][2])}
+    free = "xyzabc" if held(found["geometry"]) else found["geometry"]["freedoms"]
+    moves = {*free, *("z" for one in found["geometry"]["carriers"] if one["direction"][2])}
     low, high = space.get("tilt", (0.0, 0.0))
     heading = [0.0, 2.0 * math.pi] if moves >= set("abc") and high > 0.0 else [0.0, 0.0]
     due = {"x_mm": space["x"], "y_mm": space["y"], "z_mm": space["z"] if "z" in moves else [0.0, 0.0],
@@ -174,6 +200,8 @@ def _unit(v: Any) -> list[float]:
 def _same(a: Any, b: Any) -> bool:
     if isinstance(a, str) or a is None or isinstance(b, str) or b is None:
         return bool(a == b)
+    if isinstance(a, dict):
+        return isinstance(b, dict) and set(a) == set(b) and all(_same(v, b[k]) for k, v in a.items())
     if isinstance(a, (list, tuple)):
         return isinstance(b, list) and len(a) == len(b) and all(_same(x, y) for x, y in zip(a, b, strict=True))
     return abs(float(a) - float(b)) <= NEAR * max(1.0, abs(float(a)))

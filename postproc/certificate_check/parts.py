@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from postproc.certificate_check.balls import Ball, FloatArray, ball, scalar
-from postproc.certificate_check.legs import Bounds, Vectors, carried
+from postproc.certificate_check.held import PoseBalls, Vectors
+from postproc.certificate_check.legs import Bounds, carried
 
 ONE_JOINT = 1e-6
 """mm: platform ends of rods nearer than this are one joint"""
@@ -30,7 +31,7 @@ class RoundBar:
     radius: float
 
 
-def apart(geometry: dict[str, Any], shift: FloatArray, poses: tuple[list[Ball], list[Ball]], here: Bounds, over: Bounds,
+def apart(geometry: dict[str, Any], shift: FloatArray, poses: tuple[PoseBalls, PoseBalls], here: Bounds, over: Bounds,
           half: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """((N, 2) least distance mm and least angle to a stop rad, the same in the middles, (N, 5) share of each number).
 
@@ -62,7 +63,7 @@ def _pairs(parts: dict[str, Any], bars: tuple[list[RoundBar], list[RoundBar]]) -
             yield rod, other
 
 
-def _bars(geometry: dict[str, Any], shift: FloatArray, poses: tuple[list[Ball], list[Ball]], here: Bounds,
+def _bars(geometry: dict[str, Any], shift: FloatArray, poses: tuple[PoseBalls, PoseBalls], here: Bounds,
           over: Bounds) -> tuple[list[RoundBar], list[RoundBar]]:
     parts = geometry["parts"]
     if parts["rod_radius"] is None:
@@ -85,7 +86,7 @@ def _bars(geometry: dict[str, Any], shift: FloatArray, poses: tuple[list[Ball], 
     return rods, [*_spindle(geometry, shift, poses), *_slides(geometry, poses[0])]
 
 
-def _spindle(geometry: dict[str, Any], shift: FloatArray, poses: tuple[list[Ball], list[Ball]]) -> Iterator[RoundBar]:
+def _spindle(geometry: dict[str, Any], shift: FloatArray, poses: tuple[PoseBalls, PoseBalls]) -> Iterator[RoundBar]:
     parts = geometry["parts"]
     if parts["spindle_radius"] is None:
         return
@@ -95,7 +96,7 @@ def _spindle(geometry: dict[str, Any], shift: FloatArray, poses: tuple[list[Ball
     yield RoundBar((low, high), (low_by, high_by), float(parts["spindle_radius"]))
 
 
-def _slides(geometry: dict[str, Any], pose: list[Ball]) -> Iterator[RoundBar]:
+def _slides(geometry: dict[str, Any], pose: PoseBalls) -> Iterator[RoundBar]:
     parts = geometry["parts"]
     if parts["rail_radius"] is None:
         return
@@ -142,7 +143,7 @@ def _normal(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> Float
     return np.where((size > 1e-9)[:, None], gap / np.maximum(size, 1e-30)[:, None], np.array([1.0, 0.0, 0.0]))
 
 
-def _stops(geometry: dict[str, Any], poses: tuple[list[Ball], list[Ball]], here: Bounds, over: Bounds,
+def _stops(geometry: dict[str, Any], poses: tuple[PoseBalls, PoseBalls], here: Bounds, over: Bounds,
            half: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     parts, n = geometry["parts"], len(half)
     least, at, share = np.full(n, np.inf), np.full(n, np.inf), np.zeros((n, 5))

@@ -96,7 +96,7 @@ def platform_motion(frame: RodFrame, errors: RodErrors, q: Floats, pose: tuple[F
 @dataclass(frozen=True, eq=False)
 @arrays(reach="N H", travels="H", shift="N K")
 class HoldRates:
-    """Rows of what holds a platform besides its rods (`kinematics/legs/holds.py`), as `HeldLoops` needs them.
+    """Rows of what holds a platform besides its rods (`kinematics/holds.py`), as `HeldLoops` needs them.
 
     Attributes:
         weight: mm, of the rows

@@ -22,7 +22,7 @@ from functools import cached_property
 import numpy as np
 
 from machines.kinematics import columns
-from machines.kinematics.legs.holds import Holds
+from machines.kinematics.holds import Holds
 from machines.kinematics.legs.loops import Loops
 from machines.kinematics.rod_loops import UNBOUNDED
 from machines.kinematics.sliders import solved

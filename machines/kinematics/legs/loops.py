@@ -14,8 +14,8 @@ from typing import Literal, cast
 
 import numpy as np
 
+from machines.kinematics.holds import Holds
 from machines.kinematics.legs.drives import Drives
-from machines.kinematics.legs.holds import Holds
 from machines.kinematics.sliders import determinant, solved, three_spheres, two_circles, unsolvable
 from toolpaths.arrays import Bools, Floats
 from toolpaths.dataclass import dataclass

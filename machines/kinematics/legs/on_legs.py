@@ -56,17 +56,16 @@ class OnLegs(RedundantLegs):
             object.__setattr__(self, "jets_proved", False)
 
     @property
-    def leg_geometry(self) -> LegGeometry | None:
-        """See the base class; None of platforms that something else holds too, and of joints on rings."""
-        if self.loops.holds is not None or self.loops.rings is not None:
-            return None
+    def leg_geometry(self) -> LegGeometry:
+        """See the base class."""
         of, names = self.legs, np.array(self.axis_names)
         pairs = np.zeros((len(of.lengths), 3)) if self.clearance is None else pairs_of(
             len(of.lengths), self.clearance.leg, self.clearance.shift)
         return LegGeometry(self.leg_names, of.points, of.directions, of.arms, of.lengths, of.roots, of.slide, of.arm,
                            self.loops.joints, pairs, self.loops.freedoms, self.gauge,
                            tuple(names[self.carriers_at].tolist()), self.carriers, self.workspace,
-                           kept=self.loops.kept, bars=self.loops.bars)
+                           kept=self.loops.kept, bars=self.loops.bars, holds=self.loops.holds, free=self.loops.free,
+                           rings=self.loops.rings)
 
     @property
     def leg_names(self) -> tuple[str, ...]:

@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 
 import machines
 from machines.analysis.certify import Wanted, certify
-from machines.certificate.enclosure import columns, enclosed, least_singular
+from machines.certificate.enclosure import columns, enclosed, least_singular, set_rows
+from machines.certificate.following import following
 from machines.certificate.lookup import key_of
 from machines.certificate.poses import PosesOfBoxes
 from machines.certificate.search import AskedProof, prove
@@ -25,7 +26,7 @@ from tests.certificates import on_legs
 from toolpaths.diagnostics import DiagnosticError
 
 KINDS = ["uranesx", "rotary-delta", "hexapod", "hexaslide-cone", "h4a-c-table", "planar-delta-z", "triaglide", "h4-rotary",
-         "macro-micro"]
+         "macro-micro", "tripod-head", "tricept", "linuxcnc-pentapod"]
 
 
 def boxes(m: Machine, n: int, seed: int = 0) -> tuple[PosesOfBoxes, Span, Span]:
@@ -59,8 +60,8 @@ def test_figures_of_a_pose_are_those_of_the_machine(name: str) -> None:
     poses, _, pose = boxes(m, 50)
     kin, legs, at = m.kinematics, poses.legs, enclosed(poses, pose)
     free, _ = columns(legs)
-    least = np.linalg.svd(at.matrix.lo[:, :len(legs.names)][:, :, free], compute_uv=False)[:, -1]
-    turn = poses.turn(pose)[0].lo
+    least = np.linalg.svd(at.matrix.lo[:, :set_rows(legs)][:, :, free], compute_uv=False)[:, -1]
+    turn = following(poses.follows, pose).turn.lo if poses.follows else poses.turn(pose)[0].lo
     tip = pose.lo[:, :3] + (turn @ legs.gauge if legs.turns else legs.gauge)
     own = [m.axis_names.index(letter) for letter in legs.names]
     axis, spin = turn[:, :, 2] if legs.turns else np.tile([0.0, 0.0, 1.0], (50, 1)), pose.lo[:, 3] * (legs.turns == "c")
