@@ -189,7 +189,8 @@ class Rods:
         tool = apply(head, _UP[None])
         if self.wrist:
             tool, reach = self._at_wrist(q, letters)
-            least = _between(np.broadcast_to(tool, axis.shape), axis) if self.turns else np.eye(3)[None]
+            turns = self.turns or self.wrong
+            least = _between(np.broadcast_to(tool, axis.shape), axis) if turns else np.eye(3)[None]
             return self._closed(q, letters, (tip, axis, length), np.broadcast_to(least, (len(q), 3, 3)), (tool, reach))
         platform = self._nominal(axis * np.where(tool[:, 2:] < 0.0, -1.0, 1.0))  # past a quarter turn the head points back
         if self.wrong and (self.turns != "c" or self.bars is not None):
