@@ -36,8 +36,13 @@ class HeldValues:
 
     def column(self, n: int, dtype: Any) -> Array:
         """(n,) value of every row."""
-        starts = np.minimum(np.append(self.rows, n), n)
-        return np.repeat(np.array(self.values, dtype), np.diff(starts))
+        return self.spread(np.array(self.values, dtype), n)
+
+    def spread(self, values: Array, n: int) -> Array:
+        """(n,) one of values (K,), for each that was set, of every row; where all are one it is kept once, read-only."""
+        if (values == values[0]).all() or (values != values).all():
+            return np.broadcast_to(values[0], n)
+        return np.repeat(values, np.diff(np.minimum(np.append(self.rows, n), n)))
 
 
 class Execution:

@@ -11,7 +11,7 @@ import numpy as np
 
 from postproc.witness.clamps import check_clamps, other_limits
 from postproc.witness.clfile import commanded
-from postproc.witness.commanded import ARC, LINE, Commanded
+from postproc.witness.commanded import LINE, Commanded
 from postproc.witness.errors import ErrorChain, error_chain
 from postproc.witness.evidence import Aspect, Case, Compared, ExecutedBlocks, Finding, NotCompared, Testimony
 from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged
@@ -20,7 +20,7 @@ from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
 from postproc.witness.sides import check_sides
 from postproc.witness.splines import check_curves
 from postproc.witness.states import check_feeds, check_holes, check_states, check_velocities, tools_of, with_spindle
-from postproc.witness.stretches import BOTTOM, matched, targets_of, turns_of
+from postproc.witness.stretches import BOTTOM, is_cut, matched, targets_of, turns_of
 from postproc.witness.text import Array
 from postproc.witness.turning import check_turning
 
@@ -103,6 +103,7 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     if not len(targets):
         return [], (0.0, 0.0), {}, []
     cut = cut_of(case, c, np.concatenate([tip, *splines.values()]) if splines else tip, axis, centre, normal, place)
+    del tip, axis
     there, along = poses.at(np.arange(len(executed)), 1.0)
     turns = turns_of(poses)
     match, owner = matched(targets, there, along, turns, case.tolerance + 1e-6, case.axis_tolerance + 1e-6)
@@ -137,14 +138,13 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     checks = check_turning(case, executed), check_curves(case, executed), _held_spins(w, c, case)
     (_, turned), (_, curves), (_, held) = checks
     found += [fault for faults, _ in checks for fault in faults]
-    feeding = (w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)
-    faults, clamped = check_clamps(case, executed, w.inside & (w.code > 0) & feeding & (w.on_path() | w.returns))
+    faults, clamped = check_clamps(case, executed, w.inside & (w.code > 0) & is_cut(w.kind) & (w.on_path() | w.returns))
     found += faults
     if case.limits is not None:
         found += [Finding("limits", what, 0, 0) for what in other_limits(table, executed.letters, case.limits)]
     faults, zeros = _zero(case, c, place, poses)
     found += faults
-    good = w.on_path() & np.isin(w.kind, (LINE, ARC, BOTTOM))
+    good = w.on_path() & is_cut(w.kind)
     worst = float(w.away[good].max(initial=0.0)), float(w.tilt[good].max(initial=0.0))
     counts: dict[Aspect, int] = {
         "positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()), "holes": holes, "feeds": feeds,
@@ -177,8 +177,10 @@ def _held_spins(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], int
     """Cuts with a tool that `keeps_spin` whose platform turns it about itself; how many blocks were compared."""
     e, machine, tools = w.poses.executed, w.poses.machine, case.setup.get("tools", {})
     keeps = [int(n) for n, tool in tools.items() if (tool or {}).get("keeps_spin")]
-    rows = np.flatnonzero(w.on_path() & np.isin(w.kind, (LINE, ARC, BOTTOM)) & np.isin(e.tool, keeps))
-    if not len(rows) or not isinstance(machine, Rods) or machine.turns != "abc":
+    if not keeps or not isinstance(machine, Rods) or machine.turns != "abc":
+        return [], 0
+    rows = np.flatnonzero(w.on_path() & is_cut(w.kind) & np.isin(e.tool, keeps))
+    if not len(rows):
         return [], 0
     spins = np.abs(machine.spins(w.poses.joints(rows, 1.0), e.letters, w.tip[rows], w.axis[rows], w.poses.lengths(rows)))
     bad = np.flatnonzero(~(spins <= case.axis_tolerance))
