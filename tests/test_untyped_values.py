@@ -78,7 +78,7 @@ BORDERS = {
     "postproc/verification/second_witness.py": TABLES, "postproc/witness/states.py": TABLES,
     "postproc/witness/sides.py": TABLES, "postproc/witness/held.py": TABLES,
     "postproc/witness/place.py": TABLES, "postproc/witness/errors.py": TABLES,
-    "postproc/witness/machine.py": TABLES, "postproc/witness/evidence.py": TABLES,
+    "postproc/witness/machine.py": TABLES, "postproc/witness/clamps.py": TABLES, "postproc/witness/evidence.py": TABLES,
     "postproc/witness/motion.py": TABLES, "postproc/witness/second_reading.py": TABLES, "postproc/setup/files.py": TABLES,
     "toolpaths/diagnostics.py": FIGURES, "toolpaths/cl/inspect.py": FIGURES, "toolpaths/cl/structure.py": RECORDS,
     "toolpaths/interrupted_runs.py": "the journal, JSON",

@@ -7,9 +7,10 @@ import math
 import numpy as np
 
 from postproc.witness.block_times import lengths_of, seconds_of
+from postproc.witness.clamps import limits_of
 from postproc.witness.commanded import RAPID
 from postproc.witness.evidence import Finding, FindingCode
-from postproc.witness.machine import Chain, limits_of
+from postproc.witness.machine import Chain
 from postproc.witness.place import Cut, Poses
 from postproc.witness.splines import goes_back
 from postproc.witness.stretches import BOTTOM, ENTER, Targets, is_cut, is_rapid, off

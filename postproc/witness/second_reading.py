@@ -9,12 +9,12 @@ from time import process_time
 
 import numpy as np
 
-from postproc.witness.clamps import check_clamps
+from postproc.witness.clamps import check_clamps, other_limits
 from postproc.witness.clfile import commanded
 from postproc.witness.commanded import LINE, RAPID, Commanded, unit
 from postproc.witness.errors import ErrorChain, error_chain
 from postproc.witness.evidence import Aspect, Case, Compared, ExecutedBlocks, Finding, NotCompared, Testimony
-from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged, other_limits
+from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged
 from postproc.witness.motion import Walked, check_arcs, check_path
 from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
 from postproc.witness.sides import check_sides

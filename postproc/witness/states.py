@@ -9,9 +9,10 @@ from typing import Any, Literal
 
 import numpy as np
 
+from postproc.witness.clamps import limits_of
 from postproc.witness.commanded import ARC, BITS, LINE, OWN, UNFOLLOWED, UNKNOWN, Commanded, WitnessCycle
 from postproc.witness.evidence import Aspect, Case, Finding, FindingCode, NotCompared
-from postproc.witness.machine import largest_feed, limits_of, register_beyond
+from postproc.witness.machine import largest_feed, register_beyond
 from postproc.witness.motion import CHUNK, Walked, apart
 from postproc.witness.splines import length_of
 from postproc.witness.stretches import BOTTOM
