@@ -158,7 +158,7 @@ def test_cranks_that_the_module_cannot_be_are_refused(old: str, new: str, words:
 
 
 def test_where_a_length_goes_is_looked_for_once_a_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Z of a trunnion moves the tip along the tool, one drive of a Delta or a hexapod does not: the same for every program."""
+    """Z of a trunnion moves the tip along the tool, one drive of a Delta or a hexapod does not: for every program."""
     for name, along in (("linear-delta-ac", False), ("hexapod", False), ("mikron-ucp710", True)):
         m = replace(machines.load(name))
         z = m.axis_names.index("Z") if "Z" in m.axis_names else 2
