@@ -189,7 +189,8 @@ class LegsModel(KinematicsModel):
         holds = holds_of(legs, self.passive.values())
         rings = np.array([leg.ring or 0.0 for leg in legs]) if any(leg.ring for leg in legs) else None
         loops = Loops(drives, joints, own if holds is None else FREEDOMS, kept, holds, () if holds is None else own, rings,
-                      on)
+                      on, tuple(self.bars), tuple(self.passive),
+                      tuple(k for k, leg in enumerate(legs) if leg.hinge is not None))
         return OnLegs(
             loops,
             self._space(), np.array(self.gauge), names,

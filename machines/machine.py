@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from machines.kinematics.legs.module_pins import ModulePins
     from machines.kinematics.legs.tip_axes import TipAxes
 
+PLACES = 200
+"""of a machine's travel at which `Machine.moves_along_tool` looks"""
+
 
 @dataclass(frozen=True)
 @arrays(lower="J", upper="J", velocity="J", acceleration="J", jerk="J")
@@ -205,6 +208,31 @@ class Machine:
     def __post_init__(self) -> None:
         object.__setattr__(self, "turns", self.turns or (Turns(),) * len(self.axis_names))
         object.__setattr__(self, "clamps", self.clamps or (ClampCodes(),) * len(self.axis_names))
+
+    def moves_along_tool(self, joint: int) -> bool:
+        """True where a joint moves the tip along the tool by as much: at q = 0, without straight slides wherever the machine
+        is looked at (`PLACES`). On legs these are two forwards of many poses, made once."""
+        if joint not in self._along_tool:
+            kin = self.kinematics
+            at = np.zeros((1, kin.joints)) if kin.straight_slides else self._places()
+            tip, axis = kin.forward(at)
+            moved = kin.forward(at + np.eye(kin.joints)[joint])[0] - tip
+            good = np.isfinite(moved).all(axis=1)
+            self._along_tool[joint] = bool(good.any() and np.allclose(moved[good], axis[good], atol=1e-9))
+        return self._along_tool[joint]
+
+    @cached_property
+    def _along_tool(self) -> dict[int, bool]:
+        """What `moves_along_tool` has found, by joint."""
+        return {}
+
+    def _places(self) -> Floats:
+        """Joints (N, J) all over the travel, a turn of axes that go round, and home."""
+        limits = self.limits
+        low, high = (np.where(np.isfinite(v), v, travel * np.pi)
+                     for v, travel in ((limits.lower, -1.0), (limits.upper, 1.0)))
+        spread = np.random.default_rng(0).random((PLACES, len(low)))
+        return np.concatenate([self.home[None], low + spread * (high - low)])
 
     def on_control(self) -> Machine:
         """The machine with the axes that the module of its control has, where those are not its drives; else as it is.

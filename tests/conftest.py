@@ -8,24 +8,40 @@ from functools import cache
 
 import pytest
 
-from tests import compile_once, cover, environment, machines_once, one_command, rewrite_once, tiers
+from tests import (
+    compile_once,
+    cover,
+    environment,
+    machines_once,
+    one_command,
+    processor_time,
+    rewrite_once,
+    said,
+    tiers,
+)
 from tests.linuxcnc import interpreter, simulator
 from tests.margins import lengths_looked_at_where_they_are_seen
 from tests.processor_time import (
-    pytest_addoption,
     pytest_runtest_protocol,
     pytest_sessionfinish,
     pytest_terminal_summary,
     pytest_testnodedown,
 )
+from tests.said import pytest_runtest_call
 
-__all__ = ["environment", "lengths_looked_at_where_they_are_seen", "pytest_addoption", "pytest_runtest_protocol",
+__all__ = ["environment", "lengths_looked_at_where_they_are_seen", "pytest_runtest_call", "pytest_runtest_protocol",
            "pytest_sessionfinish", "pytest_terminal_summary", "pytest_testnodedown"]
 
 # Files that are imported make no garbage worth looking for.
 gc.disable()
 rewrite_once.install()
 machines_once.install()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Options of tests alone."""
+    processor_time.pytest_addoption(parser)
+    said.pytest_addoption(parser)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -19,6 +19,7 @@ from typing import get_args
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from postproc.witness.evidence import FindingCode
+from tests import said
 from tests.hints.case import example
 from tests.hints.cases import CASES
 from tests.source import tree, walked
@@ -29,11 +30,11 @@ DATA = ROOT / "postproc" / "explain"
 CODE = re.compile(r"^[a-z_-]+\.[a-z][a-z0-9_-]*$")
 NONE = frozenset({"postproc.controllers", "postproc.cycle_time", "postproc.toml", "bodies.part",
                   "postproc.kinematics", "postproc.cl_dialects", "postproc.cl_readers", "postproc.orientation_criteria",
-                  "postproc.report_tabs", "bodies.table", "output.coolant", "output.feed"})
+                  "postproc.report_tabs", "bodies.table", "machine.js", "output.coolant", "output.feed"})
 """texts of that form that are no codes: modules, files, keys of the set-up"""
-MADE = {"verify.tip", "verify.axis", "setup.work_offset", "coolant.off", "coolant.flood", "coolant.mist", "coolant.through",
+MADE = {"verify.tip", "verify.axis", "setup.work_offset", "coolant.mist", "coolant.through",
         "coolant.air", "proof.program", "proof.cl_file", "proof.setup", "proof.machine", "proof.controller",
-        "proof.error_model", "proof.options", "proof.postproc", *(f"witness.{found}" for found in get_args(FindingCode))}
+        "proof.error_model", "proof.options", *(f"witness.{found}" for found in get_args(FindingCode))}
 """codes that are put together from an area and what is found"""
 
 
@@ -96,6 +97,23 @@ def _usual(trees: Iterable[ast.Module]) -> dict[str, ast.Constant]:
             and (text := _words(given.defaults[-1], known)).strip(".")}
 
 
+def _hints(trees: Iterable[ast.Module]) -> Values:
+    """What classes say under a name that ends in `hint`."""
+    found: Values = {}
+    for node in (n for one in trees for n in one.body if isinstance(n, ast.ClassDef)):
+        for name, values in _assigned(node.body).items():
+            found.setdefault(name, []).extend(values if name.endswith("hint") else [])
+    return found
+
+
+def _functions(trees: Iterable[ast.Module]) -> dict[str, list[ast.FunctionDef]]:
+    """Functions that other files may call, by name."""
+    found: dict[str, list[ast.FunctionDef]] = {}
+    for node in (n for one in trees for n in one.body if isinstance(n, ast.FunctionDef) and not n.name.startswith("_")):
+        found.setdefault(node.name, []).append(node)
+    return found
+
+
 def _is_text(node: ast.AST) -> bool:
     return isinstance(node, (ast.JoinedStr, ast.BinOp, ast.IfExp)) or (
         isinstance(node, ast.Constant) and isinstance(node.value, str))
@@ -114,20 +132,108 @@ def _given(node: ast.Call, name: str, at: int, signatures: set[Signature]) -> as
     return None
 
 
-def _said(tree: ast.Module, signatures: dict[str, set[Signature]],
-          usual: dict[str, ast.Constant]) -> Iterator[tuple[str, str, str]]:
+def _inside(function: ast.AST) -> list[ast.AST]:
+    """The nodes that stand in a function, or a file, and in no function inside it."""
+    inside, todo = list[ast.AST](), list(ast.iter_child_nodes(function))
+    while todo:
+        node = todo.pop()
+        inside.append(node)
+        todo += [] if isinstance(node, ast.FunctionDef) else list(ast.iter_child_nodes(node))
+    return inside
+
+
+Values = dict[str, list[ast.AST]]
+"""expressions that statements give to names"""
+
+
+def _assigned(nodes: Iterable[ast.AST]) -> Values:
+    """Names and the values that statements give them, pairs of tuples too."""
+    found: Values = {}
+    for node in nodes:
+        if isinstance(node, (ast.Assign, ast.AnnAssign)) and node.value is not None:
+            for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
+                if isinstance(target, ast.Name):
+                    found.setdefault(target.id, []).append(node.value)
+                elif isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
+                    for one, value in zip(target.elts, node.value.elts, strict=False):
+                        found.setdefault(getattr(one, "id", ""), []).append(value)
+    return found
+
+
+class Texts:
+    """Where the text of a hint comes from that a call is given by a name, of one file: its functions and names, and
+    functions and hints of other files where only one is called so."""
+
+    def __init__(self, one: ast.Module, all_functions: dict[str, list[ast.FunctionDef]], hints: Values) -> None:
+        self._own = {n.name: [n] for n in walked(one) if isinstance(n, ast.FunctionDef)}
+        self._all, self._hints, self._names = all_functions, hints, _assigned(one.body)
+
+    def of(self, node: ast.AST | None, own: Values, depth: int = 4) -> list[ast.AST]:
+        """The texts that an expression may be."""
+        if node is None or not depth:
+            return []
+        if isinstance(node, ast.IfExp):
+            return [*self.of(node.body, own, depth), *self.of(node.orelse, own, depth)]
+        if isinstance(node, ast.BoolOp):
+            return [text for one in node.values for text in self.of(one, own, depth)]
+        if isinstance(node, ast.Dict):
+            return [text for one in node.values for text in self.of(one, own, depth)]
+        if isinstance(node, ast.Name):
+            found = own.get(node.id) or self._names.get(node.id, [])
+            return [text for one in found for text in self.of(one, {**own, node.id: []}, depth - 1)]
+        if isinstance(node, ast.Subscript):
+            return self.of(node.value, own, depth)
+        if isinstance(node, ast.Attribute):
+            return [text for one in self._hints.get(node.attr, []) for text in self.of(one, {}, depth - 1)]
+        if isinstance(node, ast.Call):
+            return self._returned(node, own, depth)
+        return [node] if _is_text(node) else []
+
+    def _returned(self, node: ast.Call, own: Values, depth: int) -> list[ast.AST]:
+        if isinstance(node.func, ast.Attribute) and node.func.attr == "get":
+            return [text for one in (node.func.value, *node.args[1:]) for text in self.of(one, own, depth)]
+        functions = self._own.get(_called(node)) or self._all.get(_called(node), [])
+        if len(functions) != 1:
+            return []
+        inside = _inside(functions[0])
+        return [text for n in inside if isinstance(n, ast.Return) for text in self.of(n.value, _assigned(inside), depth - 1)]
+
+
+def _said(tree: ast.Module, signatures: dict[str, set[Signature]], usual: dict[str, ast.Constant],
+          texts: Texts) -> Iterator[tuple[str, str, str]]:
     """(code, message, hint) of a file; texts "" where a code stands by itself."""
     known = {"REPORT": REPORT, **_texts_of(tree)}
-    for node in walked(tree):
-        for k, one in enumerate(node.args[:3]) if isinstance(node, ast.Call) else ():
-            if isinstance(one, ast.Constant) and isinstance(one.value, str) and CODE.match(one.value):
+    for function in [tree, *(n for n in walked(tree) if isinstance(n, ast.FunctionDef))]:
+        inside, own = _inside(function), None
+        for node in inside:
+            for k, one in enumerate(node.args[:3]) if isinstance(node, ast.Call) else ():
                 assert isinstance(node, ast.Call)
-                own = signatures.get(_called(node), set())
-                message = _given(node, "message", k, own) or next(iter(node.args[k + 1:]), None)
-                for hint in _choices(_given(node, "hint", k, own) or usual.get(_called(node))):
-                    yield one.value, _words(message, known), _words(hint, known)
-        if isinstance(node, ast.Constant) and isinstance(node.value, str) and CODE.match(node.value):
-            yield node.value, "", ""
+                for code in _codes_of(one):
+                    own = own or _assigned(inside)
+                    signed = signatures.get(_called(node), set())
+                    message = _given(node, "message", k, signed) or next(iter(node.args[k + 1:]), None)
+                    hint = _given(node, "hint", k, signed) or _behind(node, k) or usual.get(_called(node))
+                    for text in texts.of(hint, own) or [hint]:
+                        yield code, _words(message, known), _words(text, known)
+            if isinstance(node, ast.Constant) and isinstance(node.value, str) and CODE.match(node.value):
+                yield node.value, "", ""
+
+
+def _codes_of(node: ast.AST) -> list[str]:
+    """The code that an argument is, or the codes of which it may be one: put together from an area and what is found."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str) and CODE.match(node.value):
+        return [node.value]
+    if isinstance(node, ast.IfExp):
+        return [*_codes_of(node.body), *_codes_of(node.orelse)]
+    if isinstance(node, ast.JoinedStr) and len(node.values) == 2 and isinstance(node.values[0], ast.Constant):
+        area = str(node.values[0].value)
+        return sorted(code for code in MADE if "." in area and code.startswith(area))
+    return []
+
+
+def _behind(node: ast.Call, at: int) -> ast.AST | None:
+    """The text behind code, message and lines, where the call goes to a function that is itself given."""
+    return next((arg for arg in node.args[at + 2:] if _is_text(arg)), None)
 
 
 def _found(node: ast.AST) -> Iterator[tuple[str, str, str]]:
@@ -162,14 +268,16 @@ def said_codes() -> set[str]:
 
 
 @cache
-def codes() -> dict[str, dict[str, list[str]]]:
-    """Messages and remedies by code, in order."""
+def codes(*, with_said: bool = True) -> dict[str, dict[str, list[str]]]:
+    """Messages and remedies by code, in order; examples of cases of hints and of bad files, then those of `said.toml`."""
     areas = frozenset(tomllib.loads((DATA / "areas.toml").read_text("utf-8")))
     found: dict[str, dict[str, list[str]]] = {code: {"messages": [], "remedies": []} for code in MADE}
     trees = _trees()
-    signatures, usual = _signatures(trees), _usual(trees)
+    signatures, usual, hints = _signatures(trees), _usual(trees), _hints(trees)
+    functions = _functions(trees)
     found_by_witness = (said for one in _trees("postproc/witness") for node in walked(one) for said in _found(node))
-    for code, message, hint in itertools.chain((said for one in trees for said in _said(one, signatures, usual)),
+    for code, message, hint in itertools.chain((each for one in trees for each in _said(
+        one, signatures, usual, Texts(one, functions, hints))),
                                                found_by_witness):
         if code in NONE or code.split(".")[0] not in areas:
             continue
@@ -184,10 +292,15 @@ def codes() -> dict[str, dict[str, list[str]]]:
             found[case.code].setdefault("example", [text])
     for file in sorted((ROOT / "tests" / "bad").glob("*.*")):
         first, _, rest = file.read_bytes().decode("latin-1").partition("\n")
-        said = re.search(r"expect: \w+ (\S+)", first)
-        if said and said[1] in found and len(rest) < 400 and rest.isascii() and all(
+        expected = re.search(r"expect: \w+ (\S+)", first)
+        if expected and expected[1] in found and len(rest) < 400 and rest.isascii() and all(
                 c.isprintable() or c == "\n" for c in rest):
-            found[said[1]].setdefault("example", [rest.strip()])
+            found[expected[1]].setdefault("example", [rest.strip()])
+    for code, kept in said.said().items() if with_said else ():
+        if code in found:
+            found[code].setdefault("example", [said.shown(kept)])
+            found[code]["remedies"] += [" ".join(hint.split()) for hint in (kept.get("hint", ""),)
+                                        if hint and not found[code]["remedies"]]
     return dict(sorted(found.items()))
 
 

@@ -78,7 +78,7 @@ BORDERS = {
     "postproc/verification/second_witness.py": TABLES, "postproc/witness/states.py": TABLES,
     "postproc/witness/sides.py": TABLES, "postproc/witness/held.py": TABLES,
     "postproc/witness/place.py": TABLES, "postproc/witness/errors.py": TABLES,
-    "postproc/witness/machine.py": TABLES, "postproc/witness/evidence.py": TABLES,
+    "postproc/witness/machine.py": TABLES, "postproc/witness/clamps.py": TABLES, "postproc/witness/evidence.py": TABLES,
     "postproc/witness/motion.py": TABLES, "postproc/witness/second_reading.py": TABLES, "postproc/setup/files.py": TABLES,
     "toolpaths/diagnostics.py": FIGURES, "toolpaths/cl/inspect.py": FIGURES, "toolpaths/cl/structure.py": RECORDS,
     "toolpaths/interrupted_runs.py": "the journal, JSON",
@@ -221,10 +221,10 @@ def test_stages_hand_on_what_the_result_holds() -> None:
     """A result takes over by name what stages hand on: each name has one type in both, in the result perhaps None."""
     held = {field.name: str(field.type) for field in dataclasses.fields(PostResult)}
     handed = {field.name: str(field.type) for field in dataclasses.fields(VerifiedStage)}
-    assert set(handed) - set(held) == {"left", "drawing"}
+    assert set(handed) - set(held) == {"left", "drawing", "sections"}
     for name in held.keys() & handed.keys():
         assert held[name].removesuffix(" | None") == handed[name].removesuffix(" | None"), name
-    assert set(held) - set(handed) == {"reached", "optimised", "feed_times"}
+    assert set(held) - set(handed) == {"reached", "optimised", "feed_times", "keep", "figures"}
 
 
 def test_a_type_that_is_passed_over_has_its_reason() -> None:

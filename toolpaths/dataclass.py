@@ -84,16 +84,29 @@ def _frozen(cls: type, eq: bool) -> Any:
     """The class with fields as the standard library finds them, and with methods that are not compiled.
 
     Raises:
-        TypeError: it derives from a dataclass that is not frozen.
+        TypeError: it derives from a dataclass that is not frozen, or a field without a default follows one that has one.
     """
     cls.__doc__ = cls.__doc__ or cls.__name__
     derived = any(dataclasses.is_dataclass(base) for base in cls.__mro__[1:])
     made: Any = dataclasses.dataclass(cls, init=False, repr=False, eq=False, frozen=derived)
+    _in_order(made)
     params = made.__dataclass_params__
     params.init, params.repr, params.eq, params.frozen = True, True, eq, True
     made.__init__ = _FirstCalled(made)
     _put(made, _printing(made), *(_comparing(made) if eq else ()), *(() if derived else _refusing(made)))
     return made
+
+
+def _in_order(cls: type) -> None:
+    """Refuse a field without a default behind one with one; the standard library does so where it writes `__init__`."""
+    optional = False
+    for f in dataclasses.fields(cls):
+        if not f.init or f.kw_only:
+            continue
+        if f.default is not MISSING or f.default_factory is not MISSING:
+            optional = True
+        elif optional:
+            raise TypeError(f"non-default argument {f.name!r} follows default argument")
 
 
 def _put(cls: type, *methods: Callable[..., Any]) -> None:

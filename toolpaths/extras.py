@@ -7,7 +7,7 @@ import importlib.util
 from toolpaths.diagnostics import DiagnosticError, error
 
 EXTRAS = {"matplotlib": ("matplotlib", "figures"), "fcl": ("python-fcl", "collision"), "rtree": ("rtree", "collision"),
-          "distributed": ("distributed", "batch")}
+          "distributed": ("distributed", "batch"), "toppra": ("toppra", "check")}
 """by import name: name of the package, extra of pyproject.toml that brings it"""
 
 

@@ -19,6 +19,8 @@ PERIOD = 0.001
 """s, the servo cycle"""
 IDLE = 0.001
 """mm of travel of a joint that a module has and the machine has not"""
+EDGE = 1e-6
+"""mm or degrees that travel ends later: at its very end, where many machines are at home, LinuxCNC stops by rounding"""
 Sections = dict[str, dict[str, str]]
 """INI: values by section and key"""
 
@@ -122,9 +124,9 @@ def _limits(machine: Machine, joint: int, travel: bool, more: float = 0.0) -> di
     """Limits of a joint, which the module counts `more`, or of an axis; tip coordinates have no travel of their own."""
     limits, scale = machine.limits, _unit(machine, joint)
     result = {}
-    for key, bound in (("MIN_LIMIT", limits.lower), ("MAX_LIMIT", limits.upper)):
+    for key, bound, edge in (("MIN_LIMIT", limits.lower, -EDGE), ("MAX_LIMIT", limits.upper, EDGE)):
         if travel and np.isfinite(bound[joint]):
-            result[key] = _number((bound[joint] + more) * scale)
+            result[key] = _number((bound[joint] + more) * scale + edge)
     for key, of_axes in (("VELOCITY", limits.velocity), ("ACCELERATION", limits.acceleration), ("JERK", limits.jerk)):
         result[f"MAX_{key}"] = _number(of_axes[joint] * scale)
     return result

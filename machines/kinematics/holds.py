@@ -21,14 +21,14 @@ from functools import cached_property
 
 import numpy as np
 
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, Ints
 from toolpaths.dataclass import dataclass
 from toolpaths.rotations import cross, dot, lengths
 from toolpaths.shapes import arrays
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(normals="A 3", points="A 3", joints="A 3", moves="A", across="S 3", through="S 3", apart="S")
+@arrays(normals="A 3", points="A 3", joints="A 3", moves="A", across="S 3", through="S 3", apart="S", lean="A", foot="A")
 class Holds:
     """A planes of the bed and S planes of the platform.
 
@@ -40,6 +40,9 @@ class Holds:
         across: (S, 3) unit vectors u in directions of the platform
         through: (S, 3) mm, O
         apart: (S,) mm, k
+        lean: (A,) mm that the planes of the bed lie off, as errors leave them
+        foot: (A,) the rod whose foot a plane of the bed goes through instead of P, -1 of none: with errors the foot may
+            leave its nominal plane as it moves
     """
 
     normals: Floats
@@ -49,6 +52,8 @@ class Holds:
     across: Floats
     through: Floats
     apart: Floats
+    lean: Floats
+    foot: Ints
 
     @property
     def count(self) -> int:
@@ -57,20 +62,34 @@ class Holds:
 
     def gaps(self, place: Floats, turn: Floats) -> Floats:
         """(N, H) mm: what each equation misses 0 by."""
-        e, arms = self._rods(place, turn)
+        e, arms = self.directions(place, turn)
         a = len(self.normals)
         first = self.moves * ((place[:, None] - self.points) * self.normals).sum(axis=2) + dot(arms[:, :a], e[:, :a])
-        return np.hstack([first, self.apart - dot(arms[:, a:], e[:, a:])])
+        return np.hstack([first - self.lean, self.apart - dot(arms[:, a:], e[:, a:])])
+
+    def at_feet(self, feet: Floats) -> Floats:
+        """(N, H) mm that `gaps` are less by where planes go through the feet (N, R, 3) of rods."""
+        result = np.zeros((len(feet), self.count))
+        for k in np.flatnonzero(self.foot >= 0):
+            result[:, k] = (feet[:, self.foot[k]] - self.points[k]) @ self.normals[k]
+        return result
+
+    def gains(self, moved: Floats) -> Floats:
+        """(N, H, R) mm of each equation per mm or rad of a rod's drive, whose foot is `moved` (N, R, 3) by it."""
+        result = np.zeros((len(moved), self.count, moved.shape[1]))
+        for k in np.flatnonzero(self.foot >= 0):
+            result[:, k, self.foot[k]] = moved[:, self.foot[k]] @ self.normals[k]
+        return result
 
     def rows(self, place: Floats, turn: Floats, lever: float) -> Floats:
         """(N, H, 6): (e, a x e / lever)."""
-        e, arms = self._rods(place, turn)
+        e, arms = self.directions(place, turn)
         return np.concatenate([self._moves[:, None] * e, cross(arms, e) / lever], axis=2)
 
     def bent(self, place: Floats, turn: Floats, twist: Floats) -> Floats:
         """(N, H) what the second derivative of each equation is at the twist (N, 6), mm and rad, without its own
         acceleration."""
-        e, arms = self._rods(place, turn)
+        e, arms = self.directions(place, turn)
         a, v, w = len(self.normals), twist[:, None, :3], twist[:, None, 3:]
         inward = cross(w, cross(w, arms[:, :a]))
         swung = cross(w, e[:, a:])
@@ -97,8 +116,8 @@ class Holds:
     def _moves(self) -> Floats:
         return np.concatenate([self.moves, np.ones(len(self.across))])
 
-    def _rods(self, place: Floats, turn: Floats) -> tuple[Floats, Floats]:
-        """(e, a), each (N, H, 3)."""
+    def directions(self, place: Floats, turn: Floats) -> tuple[Floats, Floats]:
+        """(e, a), each (N, H, 3): unit vectors, mm."""
         n, back = len(place), np.swapaxes(turn, 1, 2)
         e = np.concatenate([np.broadcast_to(self.normals, (n, *self.normals.shape)), self.across @ back], axis=1)
         arms = np.concatenate([self.joints @ back, self.through - place[:, None]], axis=1)
@@ -108,7 +127,7 @@ class Holds:
 def hinges(normals: Floats, points: Floats, joints: Floats) -> Holds:
     """Legs (A, 3) that swing about hinges along unit `normals` through `points`, their platform joints at `joints`."""
     none = np.zeros((0, 3))
-    return Holds(normals, points, joints, np.ones(len(normals)), none, none, np.zeros(0))
+    return Holds(normals, points, joints, np.ones(len(normals)), none, none, np.zeros(0), *_exact(len(normals)))
 
 
 def telescope(point: Floats, joint: Floats, line: Floats, hinge: Floats, arm: float) -> Holds:
@@ -123,7 +142,7 @@ def telescope(point: Floats, joint: Floats, line: Floats, hinge: Floats, arm: fl
     other = np.cross(line, inner)
     across = np.array([inner, other])
     return Holds(hinge[None], np.zeros((1, 3)), arm * inner[None], np.zeros(1), across, np.tile(point, (2, 1)),
-                 across @ joint)
+                 across @ joint, *_exact(1))
 
 
 def together(parts: list[Holds]) -> Holds:
@@ -138,4 +157,9 @@ def untwisted(arm: float) -> Holds:
     """
     none = np.zeros((0, 3))
     return Holds(np.array([[0.0, 1.0, 0.0]]), np.zeros((1, 3)), np.array([[arm, 0.0, 0.0]]), np.zeros(1), none, none,
-                 np.zeros(0))
+                 np.zeros(0), *_exact(1))
+
+
+def _exact(count: int) -> tuple[Floats, Ints]:
+    """(lean, foot) of planes of the bed as the machine file has them."""
+    return np.zeros(count), np.full(count, -1, dtype=np.int64)

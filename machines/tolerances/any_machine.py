@@ -2,9 +2,9 @@
 series with a platform, and the rods of platforms on bars, on hinges, on rings or round a passive leg.
 
 Dimensions are those that an error model has as constants: the line of each axis (ISO 230-1, EX0C ... EB0C, and where it
-counts from), the spindle's, and of legs rails, guides, joints, lengths and zeros of drives; hinges and a passive leg are
-exact. S is the model's own first-order sensitivity in the table frame (exact closure differentiated; Company 2000, E-15),
-adjusted as F.3.4 says by the lengths of the rods that together make the tool right in the middle.
+counts from), the spindle's, and of legs rails, guides, joints, lengths and zeros of drives, hinges of bars and legs, rings,
+and a passive leg. S is the model's own first-order sensitivity in the table frame (exact closure differentiated; Company
+2000, E-15), adjusted as F.3.4 says by the lengths of the rods that together make the tool right in the middle.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 
 from machines.geometric_error.actual.actual import Actual
 from machines.geometric_error.actual.axis_motion import effect
+from machines.geometric_error.actual.bearings import ANGLES
 from machines.geometric_error.actual.leg_frame import frame_of
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.rods import RodErrors, gives_rods, rod_frame, rod_names
@@ -28,7 +29,9 @@ from toolpaths.shapes import arrays
 GRID, TURNS, LOOKS = (5, 5, 3, 3), 4, 400
 """places and tilts of a platform, rotary axes at each; random positions of a chain of axes"""
 PART_OF: dict[str, DimensionPart] = {"rail": "drive", "guide": "guide", "carriage": "foot", "platform": "joint",
-                                     "length": "rod", "drive": "zero"}
+                                     "length": "rod", "drive": "zero", "hinge": "joint", "hinge_turn": "guide",
+                                     "ring": "joint", "point": "drive", "joint": "joint", "line_turn": "guide",
+                                     "square": "guide"}
 """what an error model calls the dimensions of legs"""
 
 
@@ -100,10 +103,10 @@ def _rods(kinematics: Kinematics) -> RodErrors | None:
 
 
 def _of_rods(name: str, rods: RodErrors) -> LegDimension:
-    who, what, *axis = name.split(".")
-    turns = what == "drive" and who in rods.arms
-    letter = "abc"["xyz".index(axis[0])] if what == "guide" else axis[0] if axis else "turn" if turns else ""
-    return LegDimension(PART_OF[what], who, letter)
+    who, what, *axis = name.removeprefix("bars.").removeprefix("passive.").split(".")
+    turns = what == "square" or (what == "drive" and who in rods.arms)
+    letter = "abc"["xyz".index(axis[0])] if what in ANGLES else axis[0] if axis else "turn" if turns else ""
+    return LegDimension(PART_OF[what], f"{who} {what}" if name in rods.bearing_names else who, letter)
 
 
 def _of_axis(name: ErrorName) -> LegDimension:

@@ -176,7 +176,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
 
         path, found = read_cl(file, options, progress, options.tolerance)
         result = run(path, m, spec, options=options, diagnostics=found, progress=progress,
-                     clock=program_clock(model))
+                     clock=program_clock(model), keep="all" if page or fields or check_program else "summary")
         noted, why = _fields(result, fields) if fields else ([], [])
         result = replace(result, diagnostics=(*result.diagnostics, *why))
         # all before a file is written; under --quiet nobody asks for times, nor for figures without --json

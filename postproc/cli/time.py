@@ -88,6 +88,7 @@ def time(machine: MachineName,
     if not files and test is None:
         raise typer.BadParameter("name the program or CL file to be timed", param_hint="FILE")
     _check_factors(what_if or [])
+    _check_against(check)
     _check(output, logs, len(files))
     _check_plan(test, len(files) * (1 + len(with_machine or []) + len(with_setup or []) + len(what_if or [])), bool(logs))
     only_with_errors(beyond, error_model)
@@ -110,6 +111,14 @@ def time(machine: MachineName,
     with shown_errors(json), progress_bar() as progress:
         values, text, outputs, found = test_of_the_control(asked, test) if test and not files else answer(asked, progress)
     report(tuple(found), json, UNKNOWN | values | {"diagnostics": [d.as_dict() for d in found]}, text, outputs)
+
+
+def _check_against(planner: str | None) -> None:
+    """A package that is not there is said before anything is computed."""
+    if planner:
+        from toolpaths.extras import need
+
+        need(planner, f"--check {planner} needs")
 
 
 def _check(output: str, logs: list[str], files: int) -> None:

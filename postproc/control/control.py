@@ -29,8 +29,6 @@ from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 XYZ = ("X", "Y", "Z")
-PLACES = 200
-"""of a machine's travel at which it is looked at"""
 InterpolationMode = Literal["axes", "tcp", "tilted"]
 MODE_NAMES: dict[InterpolationMode, str] = {"axes": "machine coordinates without RTCP", "tcp": "tool-centre-point control",
                                             "tilted": "tilted work planes"}
@@ -207,16 +205,8 @@ class Control:
     def length_on_z(self) -> bool:
         """True where a tool length offset on Z moves the controlled point from gauge point to tip: at q = 0,
         and where the slides do not move the tip straight, wherever the machine is looked at."""
-        kin, z = self.machine.kinematics, self.xyz[2]
-        if self.base == "tcp":
-            return True
-        if z < 0:
-            return False
-        at = np.zeros((1, kin.joints)) if kin.straight_slides else _places(self.machine)
-        tip, axis = kin.forward(at)
-        moved = kin.forward(at + np.eye(kin.joints)[z])[0] - tip
-        good = np.isfinite(moved).all(axis=1)
-        return bool(good.any() and np.allclose(moved[good], axis[good], atol=1e-9))
+        z = self.xyz[2]
+        return self.base == "tcp" or (z >= 0 and self.machine.moves_along_tool(z))
 
     @cached_property
     def work_offset(self) -> Floats:
@@ -312,14 +302,6 @@ class Control:
             share = np.where(rapid[:, None] & (own > 0.0), faster, share)
         result: Floats = q0 + share * step
         return result
-
-
-def _places(machine: Machine) -> Floats:
-    """Joints (N, J) all over the travel, a turn of axes that go round, and home."""
-    limits = machine.limits
-    low, high = (np.where(np.isfinite(v), v, travel * np.pi) for v, travel in ((limits.lower, -1.0), (limits.upper, 1.0)))
-    spread = np.random.default_rng(0).random((PLACES, len(low)))
-    return np.concatenate([machine.home[None], low + spread * (high - low)])
 
 
 def tool_frames(kin: Kinematics, q: Floats) -> Floats:

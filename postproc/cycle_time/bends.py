@@ -16,8 +16,6 @@ from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.shape import Shape
 from toolpaths.arrays import Bools, Floats
 
-ARM = 50.0
-"""mm from a rotary axis at which its deviations count"""
 STEEPEST, PLANNED = 0.02, 0.98
 """s in which full acceleration is built up at least, and the share of the jerks that is planned with"""
 CORNER_WIDTH, CURVE_WIDTH = 12.8, 38.4
@@ -43,7 +41,7 @@ def bend_speed(blocks: MotionBlocks, form: Shape, model: CycleTimeModel, first: 
         tolerance (E-1,): mm that the path may leave the end of each block
     """
     axes = blocks.axes
-    weight = np.where(axes.rotary, ARM, 1.0)
+    weight = blocks.arms
     length = np.where(blocks.arc, form.length, np.linalg.norm((blocks.end - blocks.start) * weight, axis=1))
     length = np.maximum(length, NOTHING)
     slower = np.where(form.length > 0.0, form.length / length, 1.0)

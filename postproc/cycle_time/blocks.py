@@ -13,6 +13,8 @@ from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice, shared
 from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays, rows_of
 
+ARM, ARMS = 50.0, (1.0, 1000.0)
+"""mm from a rotary axis at which its deviations count where no program says what it may take, and what programs may say"""
 OFF = -1.0
 """level of smoothing that is not switched on"""
 
@@ -107,7 +109,8 @@ _SHARED = ("line", "rapid", "arc", "center", "normal", "sweep", "speed", "path",
 @dataclass(frozen=True)
 @arrays(start="E #axes.letters", end="E #axes.letters", line="E", rapid="E", arc="E", center="E 3", normal="E 3",
         sweep="E", speed="E", path="int8: E", tolerance="E", chain="E", operation="E", cl_line="E", move="E", given="E",
-        pieces="E", row="E", tool="E", level="E")
+        pieces="E", row="E", tool="E", level="E",
+        turn_tolerance="E")
 class MotionBlocks:
     """E blocks that move, in mm, rad and s.
 
@@ -133,6 +136,8 @@ class MotionBlocks:
         tip: of the motion that `row` counts in; None where none is known
         level (E,): of the control's smoothing, NaN where the program states none, OFF where it has not switched it on; None
             where no dialect says
+        turn_tolerance (E,): rad that the smoothing may take of rotary axes (third value of CYCLE832, TA of cycle 32); NaN
+            or inf where the program does not say; None where no dialect says
     """
 
     axes: Axes
@@ -159,6 +164,7 @@ class MotionBlocks:
     tool: Ints | None = None
     tip: TipPath | None = None
     level: Floats | None = None
+    turn_tolerance: Floats | None = None
 
     def __post_init__(self) -> None:
         for name in _SHARED:
@@ -172,6 +178,17 @@ class MotionBlocks:
         rows = np.arange(len(self))[rows]
         moved = replace(self.pauses, block=np.searchsorted(rows, self.pauses.block, side="right") - 1)
         return replace(rows_of(self, "E", as_slice(rows)), pauses=moved)
+
+    @property
+    def arms(self) -> Floats:
+        """(A,) mm that a unit of each axis counts in deviations: of rotary axes the tolerance over that of turns where the
+        program states both (the median), else ARM."""
+        arm, blended = ARM, self.path == CornerMode.BLEND
+        if self.turn_tolerance is not None and blended.any():
+            both = (self.tolerance / self.turn_tolerance)[blended & (self.turn_tolerance > 0.0)]
+            both = both[np.isfinite(both) & (both > 0.0)]
+            arm = float(np.clip(np.median(both), *ARMS)) if len(both) else ARM
+        return np.where(self.axes.rotary, arm, 1.0)
 
     @property
     def xyz(self) -> Floats:

@@ -17,8 +17,6 @@ from postproc.cycle_time.shape import Shape, shape
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import REPORT, info, warning
 
-ARM = 50.0
-"""mm from a rotary axis at which its deviations count"""
 ARC_PIECE = 0.1
 """rad of an arc that one piece stands for; the control fits a curve through them"""
 SHORTEST = 1e-9
@@ -73,7 +71,7 @@ def commanded(blocks: MotionBlocks, model: CycleTimeModel, form: Shape, stops: B
     inner = np.where(blocks.arc, model.corner_tolerance, tolerance)[owner]
     axes = blocks.axes
     path = CommandedPath(points, length, target[owner], np.concatenate([[0.0], np.where(last, tolerance[owner], inner)]),
-                         np.concatenate([[True], stops[owner] & last]), np.where(axes.rotary, ARM, 1.0),
+                         np.concatenate([[True], stops[owner] & last]), blocks.arms,
                          None if blocks.pieces is None else 1.0 / blocks.pieces[owner])
     jerk = axes.jerk if model.jerk else np.full(len(axes.letters), np.inf)
     weight = path.weight

@@ -14,7 +14,7 @@ from postproc.cycle_time.bound import lower_bound
 from postproc.cycle_time.kinds import own_share
 from postproc.cycle_time.levels import by_level
 from postproc.cycle_time.lookahead import lookahead
-from postproc.cycle_time.model import ASSUMED, PARAMETERS, CycleTimeModel
+from postproc.cycle_time.model import ASSUMED, PARAMETERS, AssumedName, CycleTimeModel
 from postproc.cycle_time.phases import BlockTimes
 from toolpaths.arrays import Bools, Floats
 from toolpaths.dataclass import dataclass
@@ -121,16 +121,16 @@ def estimate(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel, with
 def _uncertainties(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel,
                    seconds: float) -> tuple[float, float, dict[str, float], dict[str, float]]:
     """(s below, s above, standard deviation by origin, that of assumed values by name): every uncertain value is moved by
-    one standard deviation, by formulas."""
+    one standard deviation, by formulas, whose times change by the same share."""
     known, model = model, model.quick()
     here = timed(blocks, model)
-    own = own_share(blocks, here, known, seconds)
-    low = high = (COVERAGE * own * seconds) ** 2
     begin = total(blocks, here)
+    own, scale = own_share(blocks, here, known, begin), seconds / max(begin, 1e-9)
+    low = high = (COVERAGE * own * seconds) ** 2
     assumed, fitted = _assumed_changes(blocks, machine, model), _fitted_changes(blocks, model)
     deviation: dict[str, float] = {}
     for name, changed in (*assumed, *fitted):
-        moved = sorted(total(b, timed(b, m)) - begin for b, m in changed)
+        moved = sorted(scale * (total(b, timed(b, m)) - begin) for b, m in changed)
         low += (COVERAGE * min(moved[0], 0.0)) ** 2
         high += (COVERAGE * max(moved[-1], 0.0)) ** 2
         deviation[name] = (moved[-1] - moved[0]) / 2.0
@@ -194,8 +194,17 @@ def _assumed_changes(blocks: MotionBlocks, machine: Machine, model: CycleTimeMod
             own = getattr(machine.timing, name)
             result.append((name, [(_longer(blocks, here, own * sign * ASSUMED[name]), model) for sign in (-1, 1)]))
     alone = [name for name in model.assumed if model.calibration is None or name not in PARAMETERS]
-    return result + [(name, [(blocks, with_values(model, {name: sign * ASSUMED[name]})) for sign in (-1, 1)])
+    return result + [(name, [(blocks, _another(model, name, np.exp(sign * ASSUMED[name]))) for sign in (-1, 1)])
                      for name in alone]
+
+
+def _another(model: CycleTimeModel, name: AssumedName, factor: float) -> CycleTimeModel:
+    """The model with a value times the factor: a corner tolerance that is assumed is none that the program states, and how
+    much corners use of one that it states is an uncertainty of its own."""
+    if name not in PARAMETERS:
+        return model.model_copy(update={name: getattr(model, name) * factor})
+    moved = with_values(model, {name: np.log(factor)})
+    return moved.model_copy(update={"stated_share": model.stated_share})
 
 
 def _shown(axis: str, limit: MotionOrder, model: CycleTimeModel) -> bool:

@@ -19,12 +19,14 @@ PARAMETERS = ("corner_tolerance", "block_time", "rapid", "override", "stop_time"
               "spindle_time")
 """what a log can say, in the order of `CalibrationRecord.covariance`"""
 ASSUMED = {"corner_tolerance": 0.7, "block_time": 0.7, "rapid": 0.05, "override": 0.02, "stop_time": 0.7,
-           "spindle_time": 0.7, "level_share": 0.2,
+           "spindle_time": 0.7, "level_share": 0.2, "stated_share": 0.25,
            "velocity": 0.15, "acceleration": 0.3, "jerk": 0.5, "tool_change": 0.3, "clamp": 0.3,
            "unclamp": 0.3}
-"""standard deviation of the logarithm of a value that no document states"""
+"""standard deviation of the logarithm of a value that no document states. Of a tolerance that the program states only how
+much of it a control uses is open: it is kept, and half of it to all of it is what curves and corners of controls take"""
 
-AssumedName = Literal["corner_tolerance", "block_time", "rapid", "override", "stop_time", "spindle_time", "level_share"]
+AssumedName = Literal["corner_tolerance", "stated_share", "block_time", "rapid", "override", "stop_time", "spindle_time",
+                      "level_share"]
 """parameters of a model that ASSUMED has a deviation of"""
 
 
@@ -129,8 +131,9 @@ class CycleTimeModel(UserModel):
     """of kind control: where the program has not switched its smoothing on; None: that changes nothing"""
     servo_cycle: float = Field(default=0.001, gt=0.0, le=0.1)
     """s, of LinuxCNC"""
-    own_share: float = Field(default=0.03, ge=0.0, le=1.0)
-    """standard deviation of the time over the model's own, as a share, where every parameter is known"""
+    own_share: float | None = Field(default=None, ge=0.0, le=1.0)
+    """standard deviation of the time over the model's own, as a share, where every parameter is known; None: by kind of
+    motion (OWN of kinds.py)"""
     assumed: tuple[AssumedName, ...] = ()
     """parameters that no document states and no run has shown"""
     calibration: CalibrationRecord | None = None

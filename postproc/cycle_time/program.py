@@ -13,7 +13,17 @@ from postproc.cycle_time.blocks import OFF, Axes, Cause, CornerMode, MotionBlock
 from postproc.cycle_time.shape import NOTHING, shape
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import arc_sweeps, coordinates, positions
-from postproc.readback.text.canonical import CURVE, LOADED, OFFSET, REGISTER, REST, SMOOTH, SMOOTH_LEVEL, Canonical
+from postproc.readback.text.canonical import (
+    CURVE,
+    LOADED,
+    OFFSET,
+    REGISTER,
+    REST,
+    SMOOTH,
+    SMOOTH_AXIS,
+    SMOOTH_LEVEL,
+    Canonical,
+)
 from postproc.readback.text.clamps import closing, opening
 from postproc.readback.text.modal import columns, fill_values, modal_state
 from postproc.readback.text.words import Words
@@ -77,7 +87,8 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
                           np.full(len(end), np.inf), path, tolerance[block], chain[block], origin.operation, origin.names,
                           pauses,
                            origin.cl_line, origin.move, _feed_lengths(motion, control), pieces, np.arange(len(motion)),
-                           tool=np.asarray(motion.tool[:len(motion)]), level=_levels(words)[block])
+                           tool=np.asarray(motion.tool[:len(motion)]), level=_levels(words)[block],
+                          turn_tolerance=fill_values(*words.pick(SMOOTH_AXIS), words.lines)[block] * DEG)
     turned = np.where(np.isnan(motion.pitch), override, 1.0)
     linear = _linear(motion, control)
     blocks = replace(blocks, speed=_clamped(_speeds(motion, blocks, linear, by_radius) * turned, blocks, linear, machine))
@@ -161,7 +172,8 @@ def _pieces(blocks: MotionBlocks, motion: Motion, control: Control, unit: Floats
 
 def _path_modes(words: Words, blends_unstated: bool, under_61: CornerMode) -> tuple[Array, Floats, Floats]:
     """(B + 1,) Path, tolerance and chain in force at each block: G61, G61.1, G64 P Q (LinuxCNC G-code
-    reference; G61 as `under_61`), else what the reader says of the control's smoothing."""
+    reference; G61 as `under_61`), else what the reader says of the control's smoothing, as under a G64 that states none
+    (SINUMERIK: CYCLE832 stands behind G64)."""
     at, codes = words.pick("G")
     keep = np.isin(codes, (61.0, 61.1, 64.0))
     at, codes = at[keep], codes[keep]
@@ -175,6 +187,7 @@ def _path_modes(words: Words, blends_unstated: bool, under_61: CornerMode) -> tu
     stated = np.where(smooth == 0.0, np.nan, smooth) if not blends_unstated else np.full(words.lines + 1, np.inf)
     stated[at[0] if len(at) else words.lines + 1:] = np.nan
     own = _carried(at, tolerance, words.lines)
+    own = np.where(np.isinf(own) & np.isfinite(smooth) & (smooth > 0.0), smooth, own)
     exact, rounded = _exact_stops(words)
     held = np.nan_to_num(_carried(at, path.astype(np.float64), words.lines), nan=float(CornerMode.BLEND)).astype(np.int8)
     return (np.where(exact, CornerMode.STOP, held).astype(np.int8),

@@ -23,7 +23,8 @@ from postproc.planning.geometry import MachinePath
 from postproc.planning.planned import pass_feed
 from toolpaths.arrays import Floats
 from toolpaths.dataclass import dataclass
-from toolpaths.diagnostics import REPORT, Diagnostic, DiagnosticError, error
+from toolpaths.diagnostics import REPORT, Diagnostic, error
+from toolpaths.extras import need
 
 BEYOND = 1e-3
 """part by which a plan may seem faster than the second order on its grid"""
@@ -130,12 +131,10 @@ def _force_rows(base: Any, forces: MotorLimits, path: ParametricPath, scaled: tu
 
 def _toppra() -> tuple[Any, Any]:
     """The package and its constraints, imported where they are needed."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            import toppra
-            import toppra.algorithm
-            from toppra import constraint
-    except ImportError as fault:
-        raise DiagnosticError([error("time.toppra", f"toppra cannot be imported: {fault}; pip install toppra")]) from fault
+    need("toppra", "--check toppra needs")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import toppra
+        import toppra.algorithm
+        from toppra import constraint
     return toppra, constraint

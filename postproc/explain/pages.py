@@ -29,8 +29,10 @@ class CodePage:
             lines += ["", "What to do:", *(f"  {one}" for one in self.remedies)]
         lines += ["", "First of all:" if self.remedies else "What to do:", f"  {self.first}"]
         if self.example:
+            said = f"[{self.code}]" in self.example
             obeyed = any(line.startswith("+") for line in self.example.splitlines())
-            title = "An example (- as found, + put right):" if obeyed else "A CL file that has it:"
+            title = ("An example, as it is said:" if said else "An example (- as found, + put right):" if obeyed
+                     else "A CL file that has it:")
             lines += ["", title, *(f"  {one}" for one in self.example.splitlines())]
         return "\n".join(lines)
 

@@ -32,6 +32,8 @@ class SmoothingPlan:
     default: Smoothing
     named: dict[str, Smoothing]
     used: tuple[Smoothing, ...]
+    asked: float = 0.0
+    """mm, the largest number that the set-up asks for: it is refused alike where the control has levels that take less"""
 
     @cached_property
     def most(self) -> float:
@@ -69,7 +71,8 @@ def smoothing_plan(controller: ControllerFile, setup: SetupFile, options: Option
     stated = _stated(controller, options, default, named)
     named |= {} if stated == default else dict.fromkeys(sorted(names - named.keys()), stated)
     used = tuple(named.get(op.name, default) for op in toolpath.operations)
-    return SmoothingPlan(default, named, used), found
+    asked_mm = max((mm for mm in setup.output.smoothing.values() if not isinstance(mm, str)), default=0.0)
+    return SmoothingPlan(default, named, used, asked_mm), found
 
 
 def _usual(controller: ControllerFile, options: Options) -> float:

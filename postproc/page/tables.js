@@ -140,7 +140,7 @@ function turningParts(k) {
   const shown = found.cuts.map((c, n) => [c, n]).filter(([c]) => c.turned).slice(0, 40), kept = new Map();
   for (const c of found.cuts) if (!c.turned) kept.set(c.fixed || "no other axes are faster", (kept.get(c.fixed || "no other axes are faster") || 0) + 1);
   const rows = shown.map(([c, n]) => [`${c.first_line} to ${c.last_line}`, figure(`${base}.cuts.${n}.turned_deg`, 2, "deg"), c.cone_deg === null ? "-" : figure(`${base}.cuts.${n}.cone_deg`, 2, "deg"),
-    range(c.lead_deg), range(c.tilt_deg), figure(`${base}.cuts.${n}.ball_off_path_mm`, 5, "mm"), ...(c.control_s === null ? ["time_s", "reference_time_s"] : ["control_s", "reference_control_s"]).map((key) => figure(`${base}.cuts.${n}.${key}`, 3, "s"))]);
+    range(c.lead_deg), range(c.tilt_deg), figure(`${base}.cuts.${n}.off_path_mm`, 5, "mm"), ...(c.control_s === null ? ["time_s", "reference_time_s"] : ["control_s", "reference_control_s"]).map((key) => figure(`${base}.cuts.${n}.${key}`, 3, "s"))]);
   return [make("h3", {}, "Axes that turn along the cuts"),
     make("p", {}, `The tool axis is turned along ${found.turned} of ${found.cuts.length} cuts; the centre of the ball stays on its path.` + (shown.length < found.turned ? ` The first ${shown.length} are shown.` : "")),
     rows.length ? table(["CL lines", "Turned by at most", "Allowed", "Lead, deg", "Tilt, deg", "Ball off its path", "Time", "With the CL file's axes"], rows, [1, 2, 3, 4, 5, 6, 7]) : null,

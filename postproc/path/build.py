@@ -23,12 +23,15 @@ from postproc.path.rewinds import RetractPlan
 from postproc.path.solved_runs import SolvedRun, SolvedRuns, solved_runs
 from postproc.path.zero_entry import BELOW_HOME, ZeroEntry, cost, needed, zero_entry
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Array, Floats, Ints, as_slice, distinct, taken
+from toolpaths.arrays import Array, Floats, Ints, as_slice, distinct, taken, without_nan
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, has_errors, info
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
 from toolpaths.toolpath import Kind
+
+_STRETCH = 60_000
+"""moves that become blocks together: what is known of them meanwhile stays small"""
 
 
 @dataclass(frozen=True)
@@ -128,21 +131,37 @@ def _add_runs(out: PathBuilder, road: _Road, runs: SolvedRuns, tolerance: float,
         if run.last - run.first > 1:
             together.setdefault((id(run.frame), id(run.kin), run.left), []).append(run)
     for some in together.values():
-        kin, rows = some[0].kin, np.concatenate([np.arange(run.first + 1, run.last) for run in some])
-        ends, starts = as_slice(rows), as_slice(rows - 1)
-        curves = moves.run(some[0].first, some[0].last) if len(some) == 1 else moves.curves(ends)
-        curves = _with_axes(curves, taken(runs.axis, starts), taken(runs.axis, ends))
-        where, joints = approached(kin, curves, runs.q[starts], runs.q[ends])
-        if len(where):
-            q = runs.q.copy()
-            q[rows[where]] = joints
-            runs = replace(runs, q=q)
-        left, turned, broken = add_run(out, some[0].frame, kin, moves, rows, curves, runs.q[starts], runs.q[ends].copy(),
-                                       tolerance, some[0].left, off_path)
-        worst = np.maximum(worst, left)
-        turns.append(turned)
-        found += faults.broken(machine, moves, broken, runs.q[[broken - 1, broken]], road.file)
+        rows = np.concatenate([np.arange(run.first + 1, run.last) for run in some])
+        runs = _approached(runs, some[0].kin, moves, rows)
+        step = len(rows) if off_path else _STRETCH
+        for at in range(0, len(rows), step):
+            part = rows[at:at + step]
+            starts, ends = as_slice(part - 1), as_slice(part)
+            left, turned, broken = add_run(out, some[0].frame, some[0].kin, moves, part, _curves(runs, moves, part),
+                                           runs.q[starts], runs.q[ends].copy(), tolerance, some[0].left, off_path)
+            worst = np.maximum(worst, left)
+            turns.append(turned)
+            found += faults.broken(machine, moves, broken, runs.q[[broken - 1, broken]], road.file)
     return runs, worst, turns, found
+
+
+def _approached(runs: SolvedRuns, kin: Kinematics, moves: Moves, rows: Ints) -> SolvedRuns:
+    """The runs with those moves `rows` (N,) that end where the tool lies along a rotary axis as the moves need it there."""
+    if not any(kin.rotary):
+        return runs
+    some = rows[kin.singular(without_nan(runs.q[as_slice(rows)]))]
+    where, joints = approached(kin, _curves(runs, moves, some), runs.q[some - 1], runs.q[some])
+    if not len(where):
+        return runs
+    q = runs.q.copy()
+    q[some[where]] = joints
+    return replace(runs, q=q)
+
+
+def _curves(runs: SolvedRuns, moves: Moves, rows: Ints) -> Curves:
+    """The curves of moves `rows` (N,), none of them linked, with the tool axes of the runs."""
+    curves = moves.curves(as_slice(rows))
+    return _with_axes(curves, taken(runs.axis, as_slice(rows - 1)), taken(runs.axis, as_slice(rows)))
 
 
 def _add_links(out: PathBuilder, road: _Road, runs: SolvedRuns, stand: _Stand,

@@ -25,6 +25,7 @@ from postproc.pipeline.next_modes import with_next_modes
 from postproc.pipeline.result import PostResult, VerifyResult
 from postproc.pipeline.smoothed_stages import ExcludedPasses, with_passes_taken_back
 from postproc.pipeline.stages import staged
+from postproc.pipeline.written_figures import Keep
 from postproc.readback.comparison.compare import Comparison
 from postproc.setup.fingerprint import fingerprint
 from postproc.setup.model import SetupFile, alone, load_setup
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
 def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str | FilePath = "linuxcnc",
             setup: SetupFile | str | FilePath | None = None, options: Options | None = None,
             diagnostics: list[Diagnostic] | None = None, progress: Progress | None = None,
-            clock: ProgramClock | None = None) -> PostResult:
+            clock: ProgramClock | None = None, keep: Keep = "all") -> PostResult:
     """A Toolpath as G-code for a machine and a controller, read back and compared with the path.
 
     Args:
@@ -57,6 +58,8 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
             the conversion
         clock: the time of programs on the control, by which tool axes are chosen and planned feeds compared
             (`cycle_time.conversion.program_clock`); without it tool axes are chosen by the plan alone
+        keep: "summary" lets go of path, program and feeds once the text is written, a fifth of the memory of a long
+            file: `PostResult.figures` then say what a summary needs of them
 
     Raises:
         DiagnosticError: where path or options are none, or machine, controller or set-up cannot be loaded.
@@ -69,7 +72,9 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
     if asked and (never := never_cubics(path, machine, spec, options)) is not None:
         found, asked = (*found, never), False
     native = with_cubics(path, options, kind) if asked else path
-    made = _converted(_begun(native, machine, controller, spec, setup, options, found), progress, clock)
+    if native is not path or options.orient != "keep" or options.optimise or options.feed != "programmed":
+        keep = "all"  # more programs than one are made and compared
+    made = _converted(replace(_begun(native, machine, controller, spec, setup, options, found), keep=keep), progress, clock)
     held = made.ok and made.program is not None and len(made.program.curves) > 0
     if held or native is path:
         return made

@@ -41,14 +41,14 @@ def with_next_modes(result: PostResult, staged: StagedAgain) -> PostResult:
             break
         why |= _reasons(made, made.job, modes, more)
         modes = replace(modes, refused=modes.refused | more)
-        made = staged(replace(result, refused=modes.refused))
+        made = staged(replace(result, refused=modes.refused, keep="all"))
         tried.add(_assigned(modes))
         if made.ok:
             return _said(first, made, job, modes, why)
     for alone in _each_alone(job.modes):
         if _assigned(alone) in tried:
             continue
-        made = staged(replace(result, refused=alone.refused))
+        made = staged(replace(result, refused=alone.refused, keep="all"))
         if made.ok:
             return _said(first, made, job, alone, why)
     return with_remedies(first)

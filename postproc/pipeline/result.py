@@ -14,6 +14,7 @@ from postproc.control.modes import Refused
 from postproc.controllers.model import ControllerFile
 from postproc.job.job import Job
 from postproc.path.model import JointPath
+from postproc.pipeline.written_figures import Keep, WrittenFigures
 from postproc.readback.comparison.compare import Comparison
 from postproc.reference.moves import Moves
 from postproc.setup.model import SetupFile
@@ -35,7 +36,7 @@ StageName = Literal["prepare", "share", "place", "solve", "correct", "check", "p
 
 @dataclass(frozen=True)
 class PostResult:
-    """A conversion with everything between: `text` is "" where a diagnostic is an ERROR."""
+    """A conversion with everything between, but for what `keep` lets go: `text` is "" where a diagnostic is an ERROR."""
 
     text: str
     options: Options
@@ -83,6 +84,11 @@ class PostResult:
     """(operation, mode) that "auto" has passed over"""
     reached: StageName | Literal[""] = ""
     """name of the last stage that ran, "" where none did"""
+    keep: Keep = "all"
+    """"summary": path, program and feeds are let go once the text is written, and `figures` say what a summary needs of
+    them; kept where a stage or a summary works on them still (`written_figures.is_summed_up`), or an ERROR is found"""
+    figures: WrittenFigures | None = None
+    """of path and program, where these are let go"""
 
     @property
     def ok(self) -> bool:

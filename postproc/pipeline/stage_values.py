@@ -12,6 +12,7 @@ from postproc.base.options import Options
 from postproc.base.program_time import ControlPlan
 from postproc.compile.feed import Feeds
 from postproc.compile.program import Program
+from postproc.control.control import InterpolationMode
 from postproc.control.modes import Refused
 from postproc.controllers.model import ControllerFile
 from postproc.job.job import Job
@@ -117,10 +118,12 @@ class CompiledStage(PlannedStage):
 
 @dataclass(frozen=True)
 class WrittenStage(CompiledStage):
-    """The text of the program, and of its subprograms in files of their own by file name."""
+    """The text of the program, and of its subprograms in files of their own by file name; law and first line of the CL
+    file of its sections. Path, program and feeds may have been let go by then (`PostResult.keep`)."""
 
     text: str
     files: dict[str, str]
+    sections: list[tuple[InterpolationMode, int]]
 
 
 @dataclass(frozen=True)
@@ -138,3 +141,8 @@ _Value = TypeVar("_Value", bound=BegunStage)
 def handed_on(kind: type[_Value], made: BegunStage, **more: object) -> _Value:
     """A stage's value: that of the stage before with more fields, or other ones."""
     return kind(**(vars(made) | more))
+
+
+def without_path(made: _Value) -> _Value:
+    """A written stage's value without path, program and feeds, where nothing looks at them any more."""
+    return handed_on(type(made), made, path=None, program=None, feeds=None)

@@ -29,7 +29,7 @@ from postproc.path.turn_steps import with_short_turns
 from postproc.pipeline.free_spin import spun_machine
 from postproc.pipeline.hooks import refused_hooks
 from postproc.pipeline.program_header import header_lines
-from postproc.pipeline.program_lines import cl_lines
+from postproc.pipeline.program_lines import cl_lines, section_lines
 from postproc.pipeline.result import PostResult, StageName
 from postproc.pipeline.smoothed_stages import ExcludedPasses, written_moves
 from postproc.pipeline.stage_values import (
@@ -45,8 +45,10 @@ from postproc.pipeline.stage_values import (
     VerifiedStage,
     WrittenStage,
     handed_on,
+    without_path,
 )
 from postproc.pipeline.tolerance_shares import tolerance_shares
+from postproc.pipeline.written_figures import is_summed_up, written_figures
 from postproc.planning.planned_source import limits_not_kept, shifted_moves, source_of
 from postproc.readback.comparison.slow_moves import with_fingerprint
 from postproc.reference.moves import Moves
@@ -92,12 +94,16 @@ def staged(result: PostResult, progress: Progress | None = None,
     made: Any = BegunStage(result.options, result.machine, result.controller, result.controller_name, result.setup,
                            result.diagnostics, result.toolpath, result.choice, result.turning, result.source,
                            result.asked, left, result.refused, result.control_plan)
+    begun = result
     for number, stage in enumerate(STAGES):
         made, found = stage.run(made, _named(progress, stage.name, number))
         result = replace(_recorded(result, made, found), reached=stage.name)
         if not result.ok:
-            return result
+            return result if result.figures is None else staged(replace(begun, keep="all"), progress, left)
         made = replace(made, diagnostics=result.diagnostics)
+        if stage.name == "write" and begun.keep == "summary" and is_summed_up(made.job, made.machine):
+            figures = written_figures(made.job, made.toolpath, made.path, made.program, made.feeds)
+            made, result = without_path(made), replace(result, figures=figures, path=None, program=None, feeds=None)
     return replace(result, text=made.text, files=made.files)
 
 
@@ -245,7 +251,7 @@ def written(made: CompiledStage, progress: Progress | None) -> tuple[WrittenStag
     text = writer.text(header_lines(made))
     files = {name: "\n".join(blocks) + "\n" for name, blocks in writer.files.items()}
     text, most = with_fingerprint(text, files), made.controller.format.line_length
-    return handed_on(WrittenStage, made, text=text, files=files), [
+    return handed_on(WrittenStage, made, text=text, files=files, sections=section_lines(made.program)), [
         d for one in (text, *files.values()) for d in long_blocks(one, most, file)]
 
 
@@ -277,7 +283,7 @@ def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedSta
     job, witness = made.job, None
     comparison, found = read_back(made.text, job, made.toolpath.file, progress,
                                   others={name: text.encode() for name, text in made.files.items()},
-                                  of_cl=None if made.files else lambda line: cl_lines(line, made.text, made.program,
+                                  of_cl=None if made.files else lambda line: cl_lines(line, made.text, made.sections,
                                                                                       made.controller), margins=True)
     found = [*found, *check_header(made.text, job, "")]
     found += [] if comparison is None else stated_smoothing(comparison, job, "")

@@ -36,8 +36,9 @@ def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
         for name in ("linearising", "axis_linearising"):
             shares[name.replace("linearising", "points")] = POINTS * shares[name]
             shares[name] *= 1.0 - POINTS
-    if smoothing >= tolerance:
-        return shares, [error("tolerance.smoothing", f"the control's own smoothing takes {smoothing:g} mm, the tolerance is "
+    taken = max(smoothing, job.smoothing.asked)
+    if taken >= tolerance:
+        return shares, [error("tolerance.smoothing", f"the control's own smoothing takes {taken:g} mm, the tolerance is "
                               f"{tolerance:g} mm", hint="a wider --tolerance, or a smaller kinematics.smoothing_fixed in "
                               "the controller file, or [output.smoothing] of the set-up")]
     return shares, rounding_problem(bound, tolerance - smoothing, job.axis_tolerance - axis_smoothing * DEG)

@@ -46,7 +46,7 @@ def kept(result: PostResult, machine: str, controller: str, wanted: bool, known:
         raise DiagnosticError([_moved(why, output)]) from fault
     unlike = [one.file for name in now for one in set(now[name]) ^ set((known or {}).get(name, ()))]
     if unlike:
-        raise DiagnosticError([_moved(f"{', '.join(dict.fromkeys(unlike))} changed while it was converted", output)])
+        raise DiagnosticError([_moved(f"{', '.join(sorted(set(unlike)))} changed while it was converted", output)])
     return {place: proof_text(result, now, str(output))}, []
 
 

@@ -11,6 +11,7 @@ from postproc.cycle_time.conversion import program_clock
 from postproc.pipeline.convert import convert as run_convert
 from postproc.pipeline.convert import verify as run_verify
 from postproc.pipeline.result import PostResult, VerifyResult
+from postproc.pipeline.written_figures import Keep
 from postproc.setup.model import SetupFile
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.toolpath import Toolpath
@@ -18,16 +19,18 @@ from toolpaths.toolpath import Toolpath
 
 def convert(path: Toolpath, machine: Machine | str | Path, controller: str | Path = "linuxcnc",
             setup: SetupFile | str | Path | None = None, options: Options | None = None,
-            diagnostics: list[Diagnostic] | None = None, progress: Progress | None = None, *, model: str = "") -> PostResult:
+            diagnostics: list[Diagnostic] | None = None, progress: Progress | None = None, *, model: str = "",
+            keep: Keep = "all") -> PostResult:
     """`pipeline.convert.convert`, what is chosen goes by the control's clock.
 
     Args:
         model: of the control, as of `time`
+        keep: "summary" for long files, as there
 
     Raises:
         DiagnosticError: as there.
     """
-    return run_convert(path, machine, controller, setup, options, diagnostics, progress, program_clock(model))
+    return run_convert(path, machine, controller, setup, options, diagnostics, progress, program_clock(model), keep)
 
 
 def verify(gcode: str | Path, path: Toolpath, machine: Machine | str | Path, controller: str | Path = "linuxcnc",

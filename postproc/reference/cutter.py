@@ -1,13 +1,43 @@
-"""What of a cutter matters when its axis is turned: a ball keeps its contact, any other form does not."""
+"""What of a cutter matters when its axis is turned: where the tool ends in a ball, or in a corner round a flat, it can touch
+the surface at the same point along another axis."""
 
 from __future__ import annotations
 
+from toolpaths.dataclass import dataclass
 from toolpaths.toolpath import Tool
 
 _SAME = 1e-6
 """relative difference of corner radius and half the diameter that still is a ball"""
 _APT = 7
 """parameters of CUTTER; fewer follow other conventions"""
+
+
+@dataclass(frozen=True)
+class CutterEnd:
+    """The end of a mill: `flat`, mm from its axis to the centre of its corner, and `corner`, mm, the radius of that; a ball
+    has no flat, a flat end no corner, a toroid both."""
+
+    flat: float
+    corner: float
+
+
+def cutter_end(tool: Tool | None) -> CutterEnd | None:
+    """The end of a mill; None of drills and taps, of ends that are no flat within a corner, and where the file does not say.
+
+    CUTTER/d, r, e, f, a, b, h: the corner's centre is e from the axis and f above the tip; a is 0 where the end is flat.
+    Of CUTTER/d, r the centre is d/2 - r from the axis, and r above the tip.
+    """
+    if tool is None or tool.diameter is None or tool.corner_radius is None or tool.diameter <= 0.0:
+        return None
+    if "DRILL" in tool.shape.upper() or "TAP" in tool.shape.upper():
+        return None
+    radius, half = tool.corner_radius, 0.5 * tool.diameter
+    flat, above, slope = half - radius, radius, 0.0
+    if len(tool.cutter) == _APT and (tool.cutter[2] or tool.cutter[3]):
+        flat, above, slope = tool.cutter[2], tool.cutter[3], tool.cutter[4]
+    if slope or radius < 0.0 or flat < -_SAME * half or abs(above - radius) > _SAME * half:
+        return None
+    return CutterEnd(flat if flat > _SAME * half else 0.0, radius)
 
 
 def ball_radius(tool: Tool | None) -> float | None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from postproc.pipeline.result import PostResult, VerifyResult
+from postproc.pipeline.written_figures import WrittenFigures, modes_of, points_added, written_figures
 from postproc.readback.comparison.compare import Comparison
 from postproc.readback.comparison.length_margins import margin_lines
 from postproc.reference.events import cutting, spindle_states
@@ -34,7 +35,7 @@ def as_dict(result: PostResult, output: str, estimate: Estimate | None = None) -
     """
     from postproc.cycle_time import conversion
 
-    c = result.comparison
+    c, written = result.comparison, figures_of(result)
     return {
         "output": output if result.ok else None,
         "files": neighbour_files(result, output),
@@ -42,14 +43,14 @@ def as_dict(result: PostResult, output: str, estimate: Estimate | None = None) -
         "controller": result.controller_name,
         "points_in": points_in(result.toolpath),
         "records": asdict(result.toolpath.records),
-        "blocks_out": len(result.program) if result.program is not None else 0,
-        "points_added": points_added(result),
+        "blocks_out": written.blocks if written else 0,
+        "points_added": written.added if written else points_added(result.path) if result.path is not None else 0,
         **conversion.figures(estimate),
         **deviations(c),
-        "rewinds": len(result.path.rewinds) if result.path is not None else 0,
-        "singular_events": len(result.path.turns) + len(result.path.events) if result.path is not None else 0,
+        "rewinds": written.rewinds if written else len(result.path.rewinds) if result.path is not None else 0,
+        "singular_events": written.singular if written else _singular(result),
         "linearising_bound": _bound(result),
-        "feed_reduced_blocks": int(result.feeds.slowed.sum()) if result.feeds is not None else 0,
+        "feed_reduced_blocks": written.reduced if written else 0,
         "deflection": deflection(result),
         "motor_load": motor_load(result),
         "axis_extents": {k: list(v) for k, v in (result.extents or {}).items()},
@@ -95,10 +96,22 @@ def neighbour_files(result: PostResult, output: str) -> list[str]:
     return [str(Path(output).parent / name) for name in result.files or {}] if result.ok else []
 
 
+def figures_of(result: PostResult) -> WrittenFigures | None:
+    """Of path and program, whether they are kept or not; None where no program was compiled."""
+    job, path, program, feeds = result.job, result.path, result.program, result.feeds
+    if result.figures is not None or job is None or path is None or program is None or feeds is None:
+        return result.figures
+    return written_figures(job, result.toolpath, path, program, feeds)
+
+
+def _singular(result: PostResult) -> int:
+    return len(result.path.turns) + len(result.path.events) if result.path is not None else 0
+
+
 def _bound(result: PostResult) -> dict[str, float] | None:
     """Proved bound of the deviation between points, before rounding."""
-    path = result.path
-    return None if path is None else {"tip_mm": path.worst_tip, "axis_deg": path.worst_axis / DEG}
+    bound = result.figures or result.path
+    return None if bound is None else {"tip_mm": bound.worst_tip, "axis_deg": bound.worst_axis / DEG}
 
 
 def _errors(result: PostResult) -> dict[str, Any] | None:
@@ -163,19 +176,9 @@ def _places(value: float) -> str:
 
 def output_modes(result: PostResult) -> dict[str, list[str]]:
     """By operation, the laws ("axes", "tcp", "tilted") that its cutting blocks are written under."""
-    p, toolpath = result.program, result.toolpath
-    if p is None:
-        return {}
-    cut = np.flatnonzero((p.code > 0) & ~p.link)
-    section = np.searchsorted([s.first for s in p.sections], cut, side="right") - 1
-    keys = distinct(toolpath.operation[p.row[cut]].astype(np.int64) * len(p.sections) + section)
-    found: dict[str, list[str]] = {}
-    for operation, k in zip(*(part.tolist() for part in divmod(keys, len(p.sections))), strict=True):
-        name = toolpath.operations[operation].name or f"OPERATION {operation + 1}"
-        laws = found.setdefault(name, [])
-        if p.sections[k].law not in laws:
-            laws.append(p.sections[k].law)
-    return found
+    if result.figures is not None:
+        return result.figures.modes
+    return {} if result.program is None else modes_of(result.program, result.toolpath)
 
 
 def tools_of(result: PostResult) -> list[dict[str, Any]]:
@@ -218,13 +221,6 @@ def tool_lines(result: PostResult) -> list[str]:
     if result.job is None or result.comparison is None:
         return lines
     return lines + margin_lines(result.comparison.lengths, result.job)
-
-
-def points_added(result: PostResult) -> int:
-    """Blocks that linearising put between CL points."""
-    if result.path is None:
-        return 0
-    return int((np.isfinite(result.path.u) & (result.path.u < 1.0)).sum())
 
 
 def as_text(result: PostResult, output: str, estimate: Estimate | None = None,

@@ -2,32 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
 from postproc.pipeline.result import PostResult
-from toolpaths.rotations import TWO_PI, whole_turns
+from postproc.pipeline.written_figures import unwound
 
 
 def unwinding(result: PostResult) -> dict[str, dict[str, Any]]:
     """By letter of each axis without end stops that counts its turns: seconds that linking moves of the
     program unwind it, turns from home at which it ends, seconds that the next start unwinds those."""
-    path, job = result.path, result.job
-    if path is None or job is None or not len(path):
-        return {}
-    found, machine = dict[str, dict[str, Any]](), job.machine
-    steps = np.diff(np.concatenate([machine.home[None], path.q]), axis=0)
-    link = np.isnan(path.u)
-    for j in np.flatnonzero(machine.endless).tolist():
-        if j in job.control.rolls:
-            continue
-        velocity, step = float(machine.limits.velocity[j]), np.abs(steps[link, j])
-        seconds = float((step - np.abs(step - whole_turns(step))).sum()) / velocity
-        turns = round(float(path.q[-1, j] - machine.home[j]) / TWO_PI)
-        found[machine.axis_names[j]] = {"in_program_s": seconds, "turns_left": turns,
-                                        "next_start_s": abs(turns) * TWO_PI / velocity}
-    return found
+    path, job, figures = result.path, result.job, result.figures
+    found = figures.unwound if figures else unwound(path, job) if path is not None and job is not None else {}
+    return {letter: asdict(one) for letter, one in found.items()}
 
 
 def _remedy(result: PostResult, letter: str) -> str:

@@ -49,7 +49,8 @@ class AxisLimits(UserModel):
     """the same as least distance of the contact from the tool axis, mm"""
     cone: float | None = Field(default=None, ge=0.0, le=45.0)
     """degrees by which the axis of a ball may be turned at each point of a cut, differently from point to point, away from
-    where it stands there: that of the CL file, or the one chosen for the pass; without it no axis turns along a cut"""
+    where it stands there: that of the CL file, or the one chosen for the pass; of toroids and flat ends where the file
+    states surface normals; without it no axis turns along a cut"""
 
     @model_validator(mode="after")
     def _one_centre(self) -> AxisLimits:

@@ -255,6 +255,7 @@ def _covariance(weighted: Floats, free: list[int], prior: Floats, far: Floats) -
 def _record(data: Runs, model: CycleTimeModel, fitted: CycleTimeModel, weighted: Floats, free: list[int], prior: Floats,
             before: Floats, scale: float, file: str, machine: Machine | None) -> CalibratedModel:
     measured, after = data.measured, data.modelled(fitted)
+    shift = (fitted.values() - begin_of(model).values())[free] / prior[free]
     far = np.maximum(np.abs((fitted.values() - model.values())[free]) / prior[free] - CREDIBLE, 0.0) * prior[free]
     covariance = _covariance(weighted, free, prior, far)
     sigma = np.sqrt(np.diag(covariance))
@@ -266,9 +267,11 @@ def _record(data: Runs, model: CycleTimeModel, fitted: CycleTimeModel, weighted:
         rms_before=_rms(before - measured), rms_after=_rms(after - measured), relative=_relative(measured, after),
         covariance=tuple(tuple(float(v) for v in row) for row in covariance), parameters=PARAMETERS,
         kinds={name: float(s / max(spent.sum(), CLOCK)) for name, s in zip(KINDS, spent, strict=True) if s > 0.0},
-        structure=structure(measured, after, by_kind, weighted, data.uncertainty(scale)),
+        structure=structure(measured, after, by_kind, weighted, data.uncertainty(scale), shift),
         axes=_accelerated(data, fitted), period=max(run.period for run in data.runs), not_identifiable=hidden)
-    others = tuple(name for name in model.assumed if name not in {PARAMETERS[k] for k in free})
+    fits = {PARAMETERS[k] for k in free}
+    fits |= {"stated_share"} if "corner_tolerance" in fits else set()
+    others = tuple(name for name in model.assumed if name not in fits)
     assumed = tuple(name for name in hidden if not name.endswith("_share"))
     result = fitted.model_copy(update={"calibration": calibration, "assumed": (*assumed, *others),
                                        "description": f"{model.description}, calibrated"})

@@ -13,7 +13,7 @@ _STILL = 1e-7
 """mm or degrees by which a word that stands still may differ"""
 _SHORT = 0.2
 """rad below which an arc is as long as its chord, but for the second power of its angle"""
-_CHUNK = 100_000
+_CHUNK = 20_000
 _KINDS = ("XYZ", "UVW", "ABC")
 
 

@@ -1,17 +1,22 @@
-"""Clamps of rotary axes by the text of the program alone, against what the executed blocks turn and cut."""
+"""Limits of axes as the machine file has them; clamps of rotary axes by the text of the program alone, against what the
+executed blocks turn and cut."""
 
 from __future__ import annotations
 
+import math
 import re
+from typing import Any
 
 import numpy as np
 
 from postproc.witness.evidence import Case, ExecutedBlocks, Finding
+from postproc.witness.machine import turning
 from postproc.witness.text import Array
 
 _REMARK = re.compile(rb"\([^()\n]*\)|;[^\n]*|\"[^\"\n]*\"")
 _STILL = 1e-8
 """rad"""
+LIMITS = ("least", "greatest", "velocity", "acceleration", "jerk", "home")
 
 
 def check_clamps(case: Case, executed: ExecutedBlocks, cut: Array) -> tuple[list[Finding], int]:
@@ -67,3 +72,30 @@ def _sharing(letter: str, clamps: dict[str, tuple[str, str]]) -> set[str]:
         result |= more
         codes |= {code for other in more for code in clamps[other]}
     return result
+
+
+
+def limits_of(table: dict[str, Any], letters: tuple[str, ...]) -> tuple[Array, Array]:
+    """(travel (J, 2), velocity at feed (J,)) in mm, rad, s; infinite where unlimited."""
+    unit_of = np.where(turning(table, letters), math.pi / 180.0, 1.0)
+    travel, speed = [], []
+    for name in letters:
+        axis = table.get("axes", {}).get(name, {})
+        found = axis.get("travel", "unlimited")
+        travel.append((-math.inf, math.inf) if isinstance(found, str) else found)
+        speed.append(min(axis.get("velocity", math.inf), axis.get("cutting_velocity", math.inf)))
+    return np.array(travel, np.float64) * unit_of[:, None], np.array(speed, np.float64) * unit_of
+
+
+def other_limits(table: dict[str, Any], letters: tuple[str, ...], given: Array) -> list[str]:
+    """The limits (J, 6) that are not those of the machine file, in words."""
+    found = []
+    units = np.where(turning(table, letters), math.pi / 180.0, 1.0)
+    for name, scale, values in zip(letters, units.tolist(), given.tolist(), strict=True):
+        axis = table.get("axes", {}).get(name, {})
+        travel = (-math.inf, math.inf) if axis.get("travel") == "unlimited" else axis.get("travel") or (None, None)
+        stated = [*travel, *(axis.get(key) for key in LIMITS[2:])]
+        found += [f"the {what} of {name} is {value / scale:g} here, {own:g} in the machine file"
+                  for what, own, value in zip(LIMITS, stated, values, strict=True)
+                  if own is not None and not math.isclose(own * scale, value, rel_tol=1e-9, abs_tol=1e-9)]
+    return found

@@ -86,6 +86,8 @@ def _goto(e: Execution, r: Record, line: int) -> None:
         e.gap.update((e.row, e.row + 1))
         e.point(_NAN3, _NAN3, line)
         return
+    if len(n) == 9 and abs(math.hypot(*n[6:]) - 1.0) < 1e-3:
+        e.surface[e.row] = tuple(n[6:])
     e.point(tuple(n[:3]), tuple(n[3:6]) if len(n) >= 6 else _NAN3, line)
 
 
@@ -255,17 +257,18 @@ def _load(e: Execution, r: Record, line: int) -> None:
     named = _register(r)
     if named or number != e.tool.now:
         e.register.set(e.row, named)
-    if number != e.tool.now and e.ball.rows[-1] != e.row:
-        e.ball.set(e.row, math.nan)
+    if number != e.tool.now and e.end.rows[-1] != e.row:
+        e.end.set(e.row, (math.nan, math.nan))
     e.tool.set(e.row, int(number))
     e.side.set(e.row, OFF)
 
 
 def _cutter(e: Execution, r: Record, line: int) -> None:
-    d, corner, aside, above = (*r.numbers[:4 if len(r.numbers) == 7 else 2], 0.0, 0.0, 0.0, 0.0)[:4]
-    ball = above == corner and not aside if aside or above else d == 2.0 * corner
+    d, corner, aside, above, slope = (*r.numbers[:5 if len(r.numbers) == 7 else 2], 0.0, 0.0, 0.0, 0.0, 0.0)[:5]
+    flat, known = (aside, above == corner and not slope) if aside or above else (0.5 * d - corner, True)
+    known = known and flat >= 0.0 and (corner > 0.0 or (flat > 0.0 and len(r.numbers) > 1)) and not r.has("DRILL", "TAP")
     e.cutter.set(e.row, 0.5 * d * e.scale)
-    e.ball.set(e.row, corner * e.scale if ball and corner > 0.0 and not r.has("DRILL", "TAP") else math.nan)
+    e.end.set(e.row, (flat * e.scale, corner * e.scale) if known else (math.nan, math.nan))
 
 
 def _register(r: Record) -> int:

@@ -60,8 +60,9 @@ class Commanded:
         rpm (N,): NaN where not stated; turned, flowed (N,): row of the last SPINDL and COOLNT record; name (N,): into names
         systems: rotation and origin of every system of the file by its name, in order; first: name of the one
             that the first position is in, "" for the absolute frame, None where that is not sure
-        radius (N,): register that CUTCOM names, NaN; ball, cutter (N,): mm, radius of a tool that ends in a
-            ball, NaN for others, and of any tool
+        radius (N,): register that CUTCOM names, NaN; cutter (N,): mm, radius of a tool; flat, corner (N,): mm from
+            its axis to the centre of its corner (0: a ball), and the radius of that, NaN of other ends
+        surface (N, 3): normals that the file states, NaN
         unread: what was not understood, by its text
     """
 
@@ -93,8 +94,10 @@ class Commanded:
     systems: dict[str, tuple[Array, Array]]
     first: str | None
     radius: Array
-    ball: Array
+    flat: Array
+    corner: Array
     cutter: Array
+    surface: Array
     rests: tuple[Pause, ...]
     stops: tuple[Pause, ...]
     splines: dict[int, Array] = field(default_factory=dict)

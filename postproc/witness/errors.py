@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from postproc.witness.commanded import unit
+from postproc.witness.held import Bars, wrongly_held
 from postproc.witness.machine import Chain, Rods, apply, chain, legs_of, rods, rotations
 from postproc.witness.text import Array
 
@@ -303,17 +304,24 @@ def error_rods(table: dict[str, Any], model: dict[str, Any]) -> Rods | None:
     that holds a platform with bars, wrong alone."""
     nominal, legs = rods(table), legs_of(table["kinematics"])
     if any(model.get(key) for key in ("components", "location", "map")) or any(
-            leg.get("pair") for leg in model["legs"].values()):
+            leg.get("pair") for leg in model.get("legs", {}).values()):
         return None
-    bars = bool(table["kinematics"].get("bars"))
+    kinematics = table["kinematics"]
+    names, count = list(kinematics.get("bars", {})), sum(len(leg.get("rods") or [0]) for leg in legs.values())
+    exact = bool(names) and count == 6 + len(names)
+    bars, swung = bool(names) and not exact, list[tuple[int, Array, Array]]()
     mm, rad, found = _UNITS[model.get("length_unit", "um")], _UNITS[model.get("angle_unit", "arcsec")], []
     middle = np.array([np.mean(table["kinematics"]["workspace"][k]) for k in "xyz"])
     for (name, drive, (foot, along, joint, arm, kept), size, root), leg in zip(nominal.legs, legs.values(), strict=True):
-        given, offset = model["legs"].get(name, {}), np.array(leg.get("rail_offset", (0.0, 0.0, 0.0)))
+        given, offset = model.get("legs", {}).get(name, {}), np.array(leg.get("rail_offset", (0.0, 0.0, 0.0)))
         turn = _displaced(rad * np.array([[0.0] * 3 + list(given.get("guide", (0.0, 0.0, 0.0)))]), np.zeros(3))[0, :3, :3]
         sides = (drive == "arm") * arm, -offset, middle - foot - offset, np.eye(3)[np.abs(along).argmin()]
         x = unit(next(x for v in sides if (x := v - v @ along * along) @ x > 1e-18))
         guide = np.eye(3) if drive == "length" else np.stack([x, np.cross(along, x), along], axis=1)
+        hinge = unit(np.array(leg.get("hinge") or (0.0, 0.0, 1.0), np.float64))
+        plane = [turn @ _turned(given.get("hinge_turn"), rad) @ hinge] if leg.get("hinge") else []
+        hung = names.index(leg["bar"]) if exact and leg.get("bar") else -1
+        own_bar = model.get("bars", {}).get(leg.get("bar"), {})
         more, u = (rad if drive == "arm" else mm) * given.get("drive", 0.0), turn @ along
         for k, shift in enumerate(np.array((not bars and leg.get("rods")) or [(0.0, 0.0, 0.0)])):
             own, end = (mm * np.array((given.get(key) or {k: np.zeros(3)})[k]) for key in ("carriage", "platform"))
@@ -321,16 +329,35 @@ def error_rods(table: dict[str, Any], model: dict[str, Any]) -> Rods | None:
             arms = rotations(u, np.array([more]))[0] @ (turn @ arm + guide @ own)
             start = start + (0.0 if drive == "arm" else guide @ own + (drive == "slide") * more * u)
             rod = size + mm * (given.get("length") or {k: 0.0})[k] + (drive == "length") * more
-            found.append((name, drive, np.array([start, u, joint + shift + end, arms, kept]), rod, root))
-    due = len(nominal.legs) if bars or nominal.besides.any or nominal.rings else 6 - 2 * nominal.held[2]
-    return replace(nominal, legs=tuple(found), wrong=True) if len(found) == due else None
+            swing = _turned(own_bar.get("hinge_turn"), rad)
+            swung.append((hung, swing @ _axis(nominal.turns), swing @ (kept + shift + end)))
+            at = mm * np.array(own_bar.get("hinge", (0.0, 0.0, 0.0))) if hung >= 0 else shift + end
+            found.append((name, drive, np.array([start, u, joint + at, arms, kept * (hung < 0), *plane]), rod, root))
+    due = len(nominal.legs) if bars or nominal.besides.any or nominal.rings else 6 - 2 * nominal.held[2] + len(names)
+    rings = {name: radius + mm * model.get("legs", {}).get(name, {}).get("ring", 0.0)
+             for name, radius in nominal.rings.items()}
+    besides = wrongly_held(nominal.besides, list(kinematics.get("passive", {})), model.get("passive", {}), mm,
+                           lambda given: _turned(given, rad))
+    hung_on = Bars(*(np.array(part) for part in zip(*swung, strict=True))) if exact else None
+    return replace(nominal, legs=tuple(found), wrong=True, rings=rings, besides=besides, bars=hung_on) \
+        if len(found) == due else None
+
+
+def _turned(given: Any, rad: float) -> Array:
+    """(3, 3) of three turns about x, y, z."""
+    return _displaced(rad * np.array([[0.0] * 3 + list(given or (0.0, 0.0, 0.0))]), np.zeros(3))[0, :3, :3]
+
+
+def _axis(turns: str) -> Array:
+    return np.eye(3)["abc".index(turns[-1])] if turns else np.zeros(3)
 
 
 def error_chain(table: dict[str, Any], model: dict[str, Any], files: dict[str, bytes]) -> ErrorChain | Rods | None:
     """The machine of a machine file with the errors of a model file over its CSV tables; None for one that is not known."""
     kind = table.get("kinematics", {}).get("kind", table.get("kinematics", {}).get("family"))
     if kind != "serial":
-        return error_rods(table, model) if kind in ("legs", "linear-delta", "h4-linear") and model.get("legs") else None
+        return error_rods(table, model) if kind in ("legs", "linear-delta", "h4-linear") and any(
+            model.get(key) for key in ("legs", "bars", "passive")) else None
     machine, structure = chain(table), table["kinematics"]["structure"]
     units = [_UNITS[model.get("length_unit", "um")]] * 3 + [_UNITS[model.get("angle_unit", "arcsec")]] * 3
     components: dict[str, list[tuple[int, ComponentError]]] = {}

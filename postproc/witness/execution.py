@@ -36,8 +36,13 @@ class HeldValues:
 
     def column(self, n: int, dtype: Any) -> Array:
         """(n,) value of every row."""
-        starts = np.minimum(np.append(self.rows, n), n)
-        return np.repeat(np.array(self.values, dtype), np.diff(starts))
+        return self.spread(np.array(self.values, dtype), n)
+
+    def spread(self, values: Array, n: int) -> Array:
+        """(n,) one of values (K,), for each that was set, of every row; where all are one it is kept once, read-only."""
+        if (values == values[0]).all() or (values != values).all():
+            return np.broadcast_to(values[0], n)
+        return np.repeat(values, np.diff(np.minimum(np.append(self.rows, n), n)))
 
 
 class Execution:
@@ -62,7 +67,9 @@ class Execution:
         self.last_direction = 1
         self.coolant, self.cycle, self.cycles = HeldValues(UNKNOWN), HeldValues(-1), list[WitnessCycle]()
         self.armed = -1
-        self.ball, self.radius, self.cutter = HeldValues(math.nan), HeldValues(math.nan), HeldValues(math.nan)
+        self.radius, self.cutter = HeldValues(math.nan), HeldValues(math.nan)
+        self.end: HeldValues = HeldValues((math.nan, math.nan))
+        self.surface: dict[int, tuple[float, ...]] = {}
         self.rests, self.stops = list[Pause](), list[Pause]()
         self.arcs: dict[int, arcs.Given] = {}
         self.toward: tuple[float, ...] | None = None

@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 
 from postproc.witness.commanded import unit
-from postproc.witness.held import HeldPlatform, held
+from postproc.witness.held import Bars, HeldPlatform, held
 from postproc.witness.text import Array
 
 _ALONG = {"X": (1, 0, 0), "Y": (0, 1, 0), "Z": (0, 0, 1), "U": (1, 0, 0), "V": (0, 1, 0), "W": (0, 0, 1),
           "A": (1, 0, 0), "B": (0, 1, 0), "C": (0, 0, 1)}
-LIMITS = ("least", "greatest", "velocity", "acceleration", "jerk", "home")
 _UP = np.array([0.0, 0.0, 1.0])
 ROD = 1e-4
 """mm by which a rod may miss its length"""
@@ -154,6 +153,7 @@ class Rods:
     tables: dict[str, Array] = field(default_factory=dict)
     wrist: dict[str, Array] = field(default_factory=dict)
     """(direction, point) (2, 3) of rotary axes in series: from the part to the bed, from the platform to the spindle"""
+    bars: Bars | None = None
     wrong: bool = False
     """every rod is a leg of its own, the platform turns as it must; of two pairs in a plane the mean of each counts"""
 
@@ -189,10 +189,11 @@ class Rods:
         tool = apply(head, _UP[None])
         if self.wrist:
             tool, reach = self._at_wrist(q, letters)
-            least = _between(np.broadcast_to(tool, axis.shape), axis) if self.turns else np.eye(3)[None]
+            turns = self.turns or self.wrong
+            least = _between(np.broadcast_to(tool, axis.shape), axis) if turns else np.eye(3)[None]
             return self._closed(q, letters, (tip, axis, length), np.broadcast_to(least, (len(q), 3, 3)), (tool, reach))
         platform = self._nominal(axis * np.where(tool[:, 2:] < 0.0, -1.0, 1.0))  # past a quarter turn the head points back
-        if self.wrong and self.turns != "c":
+        if self.wrong and (self.turns != "c" or self.bars is not None):
             platform = _between(np.broadcast_to(apply(platform, tool), axis.shape), axis) @ platform
         return self._closed(q, letters, (tip, axis, length), platform, (tool, apply(head, self.reach[None])))
 
@@ -213,7 +214,7 @@ class Rods:
         if self.wrong or "c" in self.turns:  # the tool turns about itself between blocks
             platform, off = self._spun(q, letters, gauge, platform, reach, axis)
         else:
-            off, _ = self._legs(q, letters, gauge, platform, reach, axis)
+            off = self._legs(q, letters, gauge, platform, reach, axis)[0]
         off = self._middles(off)
         aside = np.abs((gauge - apply(platform, reach + self.pivot)) * self.held).max(axis=1)
         worst = np.max([1000.0 * np.abs(axis - expected).max(axis=1), np.abs(off).max(axis=0), aside], axis=0)
@@ -238,11 +239,20 @@ class Rods:
         best, found = level, np.full((1, len(q)), np.inf)
         for start in SPINS:
             platform, spin = level, np.full(len(q), start)
+            swing = None if self.bars is None else self.bars.start(_spun(axis, spin) @ level)
             for _ in range(SPIN_STEPS):
                 platform = _spun(axis, np.where(np.isfinite(spin), spin, 0.0)) @ platform
-                off, slope = self._legs(q, letters, gauge, platform, reach, axis)
-                steep = np.maximum((slope * slope).sum(axis=0), 1e-300)
-                if not np.abs(spin := -(off * slope).sum(axis=0) / steep).max(initial=0.0) > SPUN:
+                off, slope, swung = self._legs(q, letters, gauge, platform, reach, axis, swing)
+                loose, tilted = off, slope
+                if self.bars is not None:
+                    loose, tilted, by_off, by_slope = self.bars.freed(off, slope, swung)
+                steep = np.maximum((tilted * tilted).sum(axis=0), 1e-300)
+                spin = -(loose * tilted).sum(axis=0) / steep
+                most = np.abs(spin).max(initial=0.0)
+                if swing is not None:
+                    turn = by_off + by_slope * np.where(np.isfinite(spin), spin, 0.0)
+                    swing, most = swing - turn, max(most, np.abs(turn).max(initial=0.0))
+                if not most > SPUN:
                     break
             found = np.broadcast_to(found, off.shape)
             missed, least = (np.abs(self._middles(one)).max(axis=0) for one in (off, found))
@@ -253,12 +263,17 @@ class Rods:
         return best, found
 
     def _legs(self, q: Array, letters: tuple[str, ...], gauge: Array, platform: Array, reach: Array,
-              axis: Array) -> tuple[Array, Array]:
-        """(mm by which each rod misses its length, how that changes as the platform turns about the tool axis) (K, N)."""
-        offs, slopes = [], []
-        for letter, drive, (foot, along, joint, arm, kept), size, root in self.legs:
+              axis: Array, swing: Array | None = None) -> tuple[Array, Array, Array]:
+        """(mm by which each rod misses its length, how that changes as the platform turns about the tool axis, and as its
+        bar turns) (K, N)."""
+        offs, slopes, planes = [], [], []
+        swung = np.zeros((len(self.legs), len(q)))
+        for k, (letter, drive, (foot, along, joint, arm, kept, *plane), size, root) in enumerate(self.legs):
             value, own = q[:, letters.index(letter)], apply(platform, joint[None] - self.pivot - reach)
             crank = apply(rotations(along, value), arm[None]) if drive == "arm" else 0.0
+            if self.bars is not None and swing is not None and self.bars.of[k] >= 0:
+                end, turned_by = self.bars.ends(k, platform, swing[k])
+                own = own + end
             rod = foot + (value[:, None] * along if drive == "slide" else crank) - gauge - own - kept
             moved = along if drive == "slide" else np.cross(along, crank) if drive == "arm" else 0.0
             if letter in self.rings:
@@ -270,10 +285,13 @@ class Rods:
             wrong = ((rod * moved).sum(axis=1) * root < 0.0) | (due <= 0.0)
             offs.append(np.where(wrong, np.inf, long - due))
             slopes.append(-(rod * np.cross(axis, own)).sum(axis=1) / long)
-        for off, slope in self.besides.misses(gauge, self.pivot + reach, platform, axis):
+            if self.bars is not None and swing is not None and self.bars.of[k] >= 0:
+                swung[k] = -(rod * turned_by).sum(axis=1) / long
+            planes += [(-rod @ normal, np.cross(axis, own) @ normal) for normal in plane]
+        for off, slope in planes + self.besides.misses(gauge, self.pivot + reach, platform, axis):
             offs.append(off)
             slopes.append(slope)
-        return np.array(offs), np.array(slopes)
+        return np.array(offs), np.array(slopes), swung
 
 
 def _spun(axis: Array, angle: Array) -> Array:
@@ -370,29 +388,3 @@ def kinematics_of(table: dict[str, Any]) -> Chain | Rods | None:
     if kind == "serial":
         return chain(table)
     return rods(table) if kind in ("linear-delta", "h4-linear", "legs") else None
-
-
-def limits_of(table: dict[str, Any], letters: tuple[str, ...]) -> tuple[Array, Array]:
-    """(travel (J, 2), velocity at feed (J,)) in mm, rad, s; infinite where unlimited."""
-    unit_of = np.where(turning(table, letters), math.pi / 180.0, 1.0)
-    travel, speed = [], []
-    for name in letters:
-        axis = table.get("axes", {}).get(name, {})
-        found = axis.get("travel", "unlimited")
-        travel.append((-math.inf, math.inf) if isinstance(found, str) else found)
-        speed.append(min(axis.get("velocity", math.inf), axis.get("cutting_velocity", math.inf)))
-    return np.array(travel, np.float64) * unit_of[:, None], np.array(speed, np.float64) * unit_of
-
-
-def other_limits(table: dict[str, Any], letters: tuple[str, ...], given: Array) -> list[str]:
-    """The limits (J, 6) that are not those of the machine file, in words."""
-    found = []
-    units = np.where(turning(table, letters), math.pi / 180.0, 1.0)
-    for name, scale, values in zip(letters, units.tolist(), given.tolist(), strict=True):
-        axis = table.get("axes", {}).get(name, {})
-        travel = (-math.inf, math.inf) if axis.get("travel") == "unlimited" else axis.get("travel") or (None, None)
-        stated = [*travel, *(axis.get(key) for key in LIMITS[2:])]
-        found += [f"the {what} of {name} is {value / scale:g} here, {own:g} in the machine file"
-                  for what, own, value in zip(LIMITS, stated, values, strict=True)
-                  if own is not None and not math.isclose(own * scale, value, rel_tol=1e-9, abs_tol=1e-9)]
-    return found

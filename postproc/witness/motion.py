@@ -7,15 +7,16 @@ import math
 import numpy as np
 
 from postproc.witness.block_times import lengths_of, seconds_of
+from postproc.witness.clamps import limits_of
 from postproc.witness.commanded import RAPID
 from postproc.witness.evidence import Finding, FindingCode
-from postproc.witness.machine import Chain, limits_of
+from postproc.witness.machine import Chain
 from postproc.witness.place import Cut, Poses
 from postproc.witness.splines import goes_back
 from postproc.witness.stretches import BOTTOM, ENTER, Targets, is_cut, is_rapid, off
 from postproc.witness.text import Array
 
-CHUNK = 100_000
+CHUNK = 20_000
 STILL = 0.01
 """mm that a block may move the tip and be neither rapid nor feed"""
 FULL, LEAST = 0.45, 0.04
@@ -99,6 +100,16 @@ class Walked:
     def on_path(self) -> Array:
         """(E,) blocks that stay on the path to their target."""
         return self.inside & ~self.gap & (self.away <= self.tolerance[0] + EXACT) & (self.tilt <= self.tolerance[1] + EXACT)
+
+
+def apart(a: Array, b: Array, i: Array | None = None, j: Array | None = None) -> Array:
+    """(N,) mm between rows (of those `i` and `j` where they are given), few at a time."""
+    result = np.empty(len(a) if i is None else len(i))
+    for first in range(0, len(result), CHUNK):
+        part = slice(first, first + CHUNK)
+        step = a[part if i is None else i[part]] - b[part if j is None else j[part]]
+        result[part] = np.sqrt((step**2).sum(axis=1))
+    return result
 
 
 def check_path(w: Walked, lines: Array, cut: Cut | None, margin: float, link_angle: float, bent: bool,

@@ -13,7 +13,7 @@ from postproc.witness.evidence import Case, ExecutedBlocks
 from postproc.witness.machine import Chain, Rods
 from postproc.witness.text import Array
 
-CHUNK = 100_000
+CHUNK = 20_000
 PLAY = 0.5
 """mm or rad that no axis loses by turning back"""
 

@@ -6,21 +6,22 @@ import numpy as np
 
 import postproc.witness.arcs as arcs
 from postproc.witness.commanded import ARC, HOLE, LINE, RAPID, START, Commanded, unit
-from postproc.witness.execution import Execution, HeldValues, Z
+from postproc.witness.execution import Execution, Z
 from postproc.witness.splines import points_of
 from postproc.witness.text import Array
 
-_CHUNK = 100_000
+_CHUNK = 20_000
 
 def assembled(e: Execution) -> Commanded:
     """All positions of a file that is read."""
     n, points = e.row, e.text.points
     extra = np.array([row for row, *_ in e.extra], np.int64)
-    plain = np.ones(n, bool)
-    plain[extra] = False
-    numbers, line = np.empty((n, 6)), np.empty(n, np.int64)
-    numbers[plain], line[plain] = points, e.text.line
+    numbers, line = points, e.text.line
     if len(extra):
+        plain = np.ones(n, bool)
+        plain[extra] = False
+        numbers, line = np.empty((n, 6)), np.empty(n, np.int64)
+        numbers[plain], line[plain] = points, e.text.line
         numbers[extra] = [(*xyz, *axis) for _, xyz, axis, _ in e.extra]
         line[extra] = [number for *_, number in e.extra]
     tip, given = numbers[:, :3] * e.scale, ~np.isnan(numbers[:, 3])
@@ -39,7 +40,7 @@ def assembled(e: Execution) -> Commanded:
         matrix = np.eye(3) if common[row] else e.frames[place[row]][0]
         move = step[0] * axis[row] if len(step) == 1 else matrix @ np.array(step)
         tip[row] = tip[row - 1] + e.scale * move if row else np.nan
-    kind, cycle = np.full(n, LINE, np.int8), e.cycle.column(n, np.int64)
+    kind, cycle = np.full(n, LINE, np.int8), e.cycle.column(n, np.int64).copy()
     arc, centre, normal, sweep, uncertain = arcs.resolved(e.arcs, tip, place, common, e.frames, e.scale, e.dialect)
     kind[list(e.arcs.keys() & set(range(n)))] = ARC
     cycle[arc >= 0] = -1
@@ -50,19 +51,23 @@ def assembled(e: Execution) -> Commanded:
     rapid = rapid[rapid < n]
     kind[rapid[kind[rapid] != HOLE]] = RAPID
     kind[start[start < n]] = START
-    feed = np.array(e.feed.values, np.float64)[_index(e.feed, n)]
-    state = _index(e.spindle, n)
-    spindle, turned = np.array(e.spindle.values, np.float64)[state], np.array(e.spindle.rows, np.int64)[state]
+    surface = np.full((n, 3), np.nan) if e.surface else np.broadcast_to(np.nan, (n, 3))
+    for row, given_ in e.surface.items():
+        surface[row] = np.array(given_) if common[row] else e.frames[place[row]][0] @ np.array(given_)
+    feed, spindle, end = (np.array(one.values, np.float64) for one in (e.feed, e.spindle, e.end))
     known = e.known.column(n, bool) & np.isfinite(tip).all(axis=1) & np.isfinite(axis).all(axis=1)
     gap = np.zeros(n, bool)
     gap[[row for row in e.gap if row < n] + uncertain] = True
-    return Commanded(tip, axis, kind, line, known, gap, feed[:, 0], feed[:, 1] > 0, feed[:, 2] > 0, arc, centre, normal,
+    return Commanded(tip, axis, kind, line, known, gap, e.feed.spread(feed[:, 0], n), e.feed.spread(feed[:, 1] > 0, n),
+                     e.feed.spread(feed[:, 2] > 0, n), arc, centre, normal,
                      sweep, cycle, tuple(e.cycles), e.tool.column(n, np.int64), e.side.column(n, np.int64),
                      e.register.column(n, np.int64), e.name.column(n, np.int64), tuple(e.names),
-                     spindle[:, 0].astype(np.int64), spindle[:, 1], turned, e.coolant.column(n, np.int64),
-                     np.array(e.coolant.rows, np.int64)[_index(e.coolant, n)], e.systems, _first_system(e, place),
-                     e.radius.column(n, np.float64), e.ball.column(n, np.float64), e.cutter.column(n, np.float64),
-                     tuple(e.rests), tuple(e.stops), _splines(e, tip, place, common), e.unread)
+                     e.spindle.spread(spindle[:, 0].astype(np.int64), n), e.spindle.spread(spindle[:, 1], n),
+                     e.spindle.spread(np.array(e.spindle.rows), n), e.coolant.column(n, np.int64),
+                     e.coolant.spread(np.array(e.coolant.rows), n), e.systems, _first_system(e, place),
+                     e.radius.column(n, np.float64), e.end.spread(end[:, 0], n), e.end.spread(end[:, 1], n),
+                     e.cutter.column(n, np.float64), surface, tuple(e.rests), tuple(e.stops),
+                     _splines(e, tip, place, common), e.unread)
 
 
 def _splines(e: Execution, tip: Array, place: Array, common: Array) -> dict[int, Array]:
@@ -79,11 +84,6 @@ def _first_system(e: Execution, place: Array) -> str | None:
     if e.shifted or len(e.frames) != len(e.systems) + 1:
         return None
     return list(e.systems)[int(place[0]) - 1] if len(place) and place[0] else ""
-
-
-def _index(track: HeldValues, n: int) -> Array:
-    starts = np.minimum(np.append(track.rows, n), n)
-    return np.repeat(np.arange(len(track.rows)), np.diff(starts))
 
 
 def _axes(e: Execution, written: Array, given: Array) -> Array:

@@ -9,18 +9,18 @@ from time import process_time
 
 import numpy as np
 
-from postproc.witness.clamps import check_clamps
+from postproc.witness.clamps import check_clamps, other_limits
 from postproc.witness.clfile import commanded
-from postproc.witness.commanded import ARC, LINE, Commanded
+from postproc.witness.commanded import LINE, RAPID, Commanded, unit
 from postproc.witness.errors import ErrorChain, error_chain
 from postproc.witness.evidence import Aspect, Case, Compared, ExecutedBlocks, Finding, NotCompared, Testimony
-from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged, other_limits
+from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged
 from postproc.witness.motion import Walked, check_arcs, check_path
 from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
 from postproc.witness.sides import check_sides
 from postproc.witness.splines import check_curves
 from postproc.witness.states import check_feeds, check_holes, check_states, check_velocities, tools_of, with_spindle
-from postproc.witness.stretches import BOTTOM, matched, targets_of, turns_of
+from postproc.witness.stretches import BOTTOM, is_cut, matched, targets_of, turns_of
 from postproc.witness.text import Array
 from postproc.witness.turning import check_turning
 
@@ -61,14 +61,38 @@ def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
 
 
 def _reoriented(c: Commanded, axes: Array) -> Commanded:
-    """With other tool axes: balls, and arcs, stay where they are; a tool that is turned and no ball is not known. A straight
-    cut whose tip goes farther or less far for it takes the time that it had."""
+    """With other tool axes: balls and corners touch where they did, arcs stay where they are; a tool that is turned and ends
+    otherwise is not known. A straight cut whose tip goes farther or less far for it takes the time that it had."""
     turned = np.abs(axes - c.axis).max(axis=1) > 1e-12
-    move = np.where(turned[:, None], c.ball[:, None] * (c.axis - axes), 0.0)
+    surface = _surface(c, axes, turned & (c.flat > 0.0))
+    move = np.where(turned[:, None], _corner(c, c.axis, surface) - _corner(c, axes, surface), 0.0)
     centre, arcs = c.centre.copy(), np.flatnonzero(c.arc >= 0)
     centre[c.arc[arcs]] += move[arcs]
     return replace(c, tip=c.tip + move, axis=np.where(turned[:, None], axes, c.axis), centre=centre,
                    known=c.known & np.isfinite(move).all(axis=1), feed=c.feed * _longer(c, turned, move))
+
+
+def _corner(c: Commanded, axes: Array, surface: Array) -> Array:
+    """(N, 3) from tips along `axes` to the centre of ball or corner next to where it touches a surface of such normals."""
+    centre = c.corner[:, None] * axes
+    cornered = np.flatnonzero(c.flat > 0.0)
+    if len(cornered):
+        a, n = axes[cornered], surface[cornered]
+        centre[cornered] += c.flat[cornered, None] * unit(a * (a * n).sum(axis=1, keepdims=True) - n)
+    return centre
+
+
+def _surface(c: Commanded, axes: Array, wanted: Array) -> Array:
+    """(N, 3) normals: a rapid without one that turns with a cut has that of the cut it draws back from, or of the next."""
+    lacking = np.flatnonzero(wanted & np.isnan(c.surface[:, 0]) & (c.kind == RAPID))
+    stated = np.flatnonzero(~np.isnan(c.surface[:, 0]))
+    if not len(lacking) or not len(stated):
+        return c.surface
+    surface, at = c.surface.copy(), np.searchsorted(stated, lacking)
+    before, behind = stated[np.maximum(at - 1, 0)], stated[np.minimum(at, len(stated) - 1)]
+    drawn = (before == lacking - 1) & (c.kind[before] != RAPID) & (np.abs(axes[before] - axes[lacking]).max(axis=1) < 1e-9)
+    surface[lacking] = c.surface[np.where(drawn, before, behind)]
+    return surface
 
 
 def _longer(c: Commanded, turned: Array, move: Array) -> Array:
@@ -103,6 +127,7 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     if not len(targets):
         return [], (0.0, 0.0), {}, []
     cut = cut_of(case, c, np.concatenate([tip, *splines.values()]) if splines else tip, axis, centre, normal, place)
+    del tip, axis
     there, along = poses.at(np.arange(len(executed)), 1.0)
     turns = turns_of(poses)
     match, owner = matched(targets, there, along, turns, case.tolerance + 1e-6, case.axis_tolerance + 1e-6)
@@ -137,14 +162,13 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     checks = check_turning(case, executed), check_curves(case, executed), _held_spins(w, c, case)
     (_, turned), (_, curves), (_, held) = checks
     found += [fault for faults, _ in checks for fault in faults]
-    feeding = (w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)
-    faults, clamped = check_clamps(case, executed, w.inside & (w.code > 0) & feeding & (w.on_path() | w.returns))
+    faults, clamped = check_clamps(case, executed, w.inside & (w.code > 0) & is_cut(w.kind) & (w.on_path() | w.returns))
     found += faults
     if case.limits is not None:
         found += [Finding("limits", what, 0, 0) for what in other_limits(table, executed.letters, case.limits)]
     faults, zeros = _zero(case, c, place, poses)
     found += faults
-    good = w.on_path() & np.isin(w.kind, (LINE, ARC, BOTTOM))
+    good = w.on_path() & is_cut(w.kind)
     worst = float(w.away[good].max(initial=0.0)), float(w.tilt[good].max(initial=0.0))
     counts: dict[Aspect, int] = {
         "positions": int((match >= 0).sum()), "arcs": int((targets.sweep != 0.0).sum()), "holes": holes, "feeds": feeds,
@@ -177,8 +201,10 @@ def _held_spins(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], int
     """Cuts with a tool that `keeps_spin` whose platform turns it about itself; how many blocks were compared."""
     e, machine, tools = w.poses.executed, w.poses.machine, case.setup.get("tools", {})
     keeps = [int(n) for n, tool in tools.items() if (tool or {}).get("keeps_spin")]
-    rows = np.flatnonzero(w.on_path() & np.isin(w.kind, (LINE, ARC, BOTTOM)) & np.isin(e.tool, keeps))
-    if not len(rows) or not isinstance(machine, Rods) or machine.turns != "abc":
+    if not keeps or not isinstance(machine, Rods) or machine.turns != "abc":
+        return [], 0
+    rows = np.flatnonzero(w.on_path() & is_cut(w.kind) & np.isin(e.tool, keeps))
+    if not len(rows):
         return [], 0
     spins = np.abs(machine.spins(w.poses.joints(rows, 1.0), e.letters, w.tip[rows], w.axis[rows], w.poses.lengths(rows)))
     bad = np.flatnonzero(~(spins <= case.axis_tolerance))

@@ -9,10 +9,11 @@ from typing import Any, Literal
 
 import numpy as np
 
+from postproc.witness.clamps import limits_of
 from postproc.witness.commanded import ARC, BITS, LINE, OWN, UNFOLLOWED, UNKNOWN, Commanded, WitnessCycle
 from postproc.witness.evidence import Aspect, Case, Finding, FindingCode, NotCompared
-from postproc.witness.machine import largest_feed, limits_of, register_beyond
-from postproc.witness.motion import CHUNK, Walked
+from postproc.witness.machine import largest_feed, register_beyond
+from postproc.witness.motion import CHUNK, Walked, apart
 from postproc.witness.splines import length_of
 from postproc.witness.stretches import BOTTOM
 from postproc.witness.text import Array
@@ -78,12 +79,12 @@ def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], matc
     rows = np.flatnonzero(w.inside & (w.code > 0) & ~w.gap & ~w.returns & ((w.kind == LINE) | (w.kind == ARC)) & w.on_path())
     m = len(t)
     seconds = np.bincount(w.owner[rows], weights=w.seconds[rows], minlength=m)[:m]
-    length = np.sqrt(((t.tip - t.start) ** 2).sum(axis=1))
-    round_ = t.sweep != 0.0
-    flat = t.start - t.centre
-    rise = np.einsum("ni,ni->n", t.tip - t.start, t.normal)
-    radius = np.sqrt(np.maximum((flat * flat).sum(axis=1) - np.einsum("ni,ni->n", flat, t.normal) ** 2, 0.0))
-    length = np.where(round_, np.hypot(radius * np.abs(t.sweep), rise), length)
+    length = apart(t.tip, t.start)
+    k = np.flatnonzero(t.sweep != 0.0)
+    flat = t.start[k] - t.centre[k]
+    rise = np.einsum("ni,ni->n", t.tip[k] - t.start[k], t.normal[k])
+    radius = np.sqrt(np.maximum((flat * flat).sum(axis=1) - np.einsum("ni,ni->n", flat, t.normal[k]) ** 2, 0.0))
+    length[k] = np.hypot(radius * np.abs(t.sweep[k]), rise)
     length[list(t.splines)] = [length_of(points) for points in t.splines.values()]
     most = largest_feed(table)
     feed = feeds_of(c, case.setup, most)[t.row]
@@ -109,8 +110,7 @@ def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], matc
 
 def _fast_blocks(w: Walked, rows: Array, pace: Array, tolerance: float) -> Array:
     """(K,) True for blocks of cuts whose F word, or whose time, takes the tip farther than `pace` (M,), s/mm, allows."""
-    step = w.tip[rows] - w.tip[np.maximum(rows - 1, 0)]
-    length = np.sqrt(np.einsum("ni,ni->n", step, step))
+    length = apart(w.tip, w.tip, rows, np.maximum(rows - 1, 0))
     e, pace = w.poses.executed, pace[w.owner[rows]]
     straight = ~e.inverse[rows] & (np.abs(w.length[rows] - length) < 1e-4 * length) & (length > 1.0)
     by_word = straight & ((e.feed[rows] - 0.1) * e.unit[rows] * pace > 60.0 * ALLOWED)
@@ -120,8 +120,11 @@ def _fast_blocks(w: Walked, rows: Array, pace: Array, tolerance: float) -> Array
 def _groups(check: Array, feed: Array) -> Array:
     """(M,) number of the feed of each target, from 1; 0 for what is not compared."""
     result = np.zeros(len(feed), np.int64)
-    if check.any():
-        result[check] = 1 + np.unique(feed[check], return_inverse=True)[1]
+    values = feed[check]
+    if len(values):
+        new = np.flatnonzero(np.append(True, values[1:] != values[:-1]))
+        number = np.unique(values[new], return_inverse=True)[1]
+        result[check] = 1 + np.repeat(number, np.diff(np.append(new, len(values))))
     return result
 
 

@@ -60,16 +60,20 @@ def targets_of(c: Commanded, tip: Array, axis: Array, centre: Array, normal: Arr
     second = np.zeros(len(row), bool)
     second[1:] = (row[1:] == row[:-1])
     on_hole = hole[row]
-    kind = np.where(on_hole, np.where(second, BOTTOM, ENTER), c.kind[row])
+    kind = np.where(on_hole, np.where(second, BOTTOM, ENTER), c.kind[row]).astype(np.int8)
     lift = np.where(on_hole, np.where(second, -depth[row], above[row]), 0.0)
-    there = tip[row] if not on_hole.any() else tip[row] + lift[:, None] * axis[row]
     before = np.maximum(row - 1, 0)
-    start, start_axis = tip[before], axis[before]
+    if len(row) == len(c) and not on_hole.any():  # one behind the other: where each begins is where the last one ended
+        (start, there), (start_axis, along) = (_and_before(v) for v in (tip, axis))
+    else:
+        there, along = tip[row] + lift[:, None] * axis[row], axis[row]
+        start, start_axis = tip[before], axis[before]
     free = (row == 0) | ~c.known[before] | hole[before] | on_hole
     # A cut behind a hole begins where the tool has left it to, where the record says where that is.
     out = np.array([np.maximum(x.clearance, x.retract) for x in c.cycles] + [np.nan])[c.cycle]
     left = np.flatnonzero((row > 0) & is_cut(kind) & ~on_hole & good[before] & hole[before] & np.isfinite(out[before]))
-    start[left] += out[before[left], None] * start_axis[left]
+    if len(left):
+        start[left] += out[before[left], None] * start_axis[left]
     free[left] = False
     if on_hole.any():
         start[second], start_axis[second], free = there[np.flatnonzero(second) - 1], axis[row[second]], free & ~second
@@ -80,14 +84,21 @@ def targets_of(c: Commanded, tip: Array, axis: Array, centre: Array, normal: Arr
         skipped[0] = lost[row[0]] > 0
     arc = c.arc[row]
     round_ = (kind == ARC) & (arc >= 0)
-    m = len(row)
-    mid, about, sweep = np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m)
-    mid[round_], about[round_], sweep[round_] = centre[arc[round_]], normal[arc[round_]], c.sweep[arc[round_]]
+    mid, about, sweep = (np.broadcast_to(0.0, (len(row), *size)) for size in ((3,), (3,), ()))
+    if round_.any():
+        mid, about, sweep = mid.copy(), about.copy(), sweep.copy()
+        mid[round_], about[round_], sweep[round_] = centre[arc[round_]], normal[arc[round_]], c.sweep[arc[round_]]
     skipped &= ~second
     gap = c.gap[row] | skipped
-    return Targets(there, axis[row], kind, row, start, start_axis, free, gap, skipped, mid, about, np.where(gap, 0.0, sweep),
+    return Targets(there, along, kind, row, start, start_axis, free, gap, skipped, mid, about, np.where(gap, 0.0, sweep),
                    np.where(second, depth[row] + out[row], np.nan),
                    {int(k): splines[int(row[k])] for k in np.flatnonzero(np.isin(row, list(splines)))} if splines else {})
+
+
+def _and_before(values: Array) -> tuple[Array, Array]:
+    """(rows before, rows) of values (N, 3), which are held once; before the first stands itself."""
+    both = np.concatenate([values[:1], values])
+    return both[:-1], both[1:]
 
 
 def matched(targets: Targets, tip: Array, axis: Array, turns: Array, tolerance: float,

@@ -99,19 +99,19 @@ def read(data: bytes) -> ClText:
     text = _plain(data)
     text, line_of = _written_out(text)
     spans = [m.span() for m in _OTHER.finditer(text)]
-    raw = np.frombuffer(text, np.uint8)
-    ends = np.flatnonzero((raw == 10) | (raw == JOIN[0]))
+    real = _places(text, 10)
+    ends = np.union1d(real, _places(text, JOIN[0])) if JOIN in text else real
     kept = list(zip([0, *(last + 1 for _, last in spans)], [*(first for first, _ in spans), len(text)], strict=True))
-    lengths = np.diff(np.searchsorted(np.flatnonzero(raw == 10), np.array(kept)), axis=1)[:, 0].tolist()
+    lengths = np.diff(np.searchsorted(real, np.array(kept)), axis=1)[:, 0].tolist()
     rest = text[kept[-1][0]:]
     lengths[-1] += bool(rest.strip()) and not rest.endswith(b"\n")
     before = np.cumsum(lengths)
-    rows = _numbers(b"".join(memoryview(text)[first:last] for first, last in kept))
+    rows = _numbers(memoryview(text), kept)
     starts = np.searchsorted(ends, [first for first, _ in spans]) if spans else np.zeros(0, np.int64)
     found = [_record(text[first:last]) for first, last in spans]
     used = [k for k, r in enumerate(found) if r.major or r.body]
     lines = line_of[starts] if spans else starts
-    return ClText(rows, _lines_of_points(text, spans, ends, line_of), [found[k] for k in used],
+    return ClText(rows, _lines_of_points(text, spans, real, ends, line_of), [found[k] for k in used],
                   [int(before[k]) for k in used], [int(lines[k]) for k in used])
 
 
@@ -121,9 +121,15 @@ def renumbered(text: ClText, lines: tuple[int, ...]) -> ClText:
     return ClText(text.points, found[text.line - 1], text.records, text.before, [int(found[k - 1]) for k in text.lines])
 
 
-def _lines_of_points(text: bytes, spans: list[tuple[int, int]], ends: Array, line_of: Array) -> Array:
-    """Lines of the plain points: all line ends but those of other records, and those that only continue."""
-    real = ends[np.frombuffer(text, np.uint8)[ends] == 10]
+def _places(text: bytes, character: int) -> Array:
+    """Where a character stands in a text."""
+    raw = np.frombuffer(text, np.uint8)
+    found = [first + np.flatnonzero(raw[first:first + _CHUNK] == character) for first in range(0, len(raw), _CHUNK)]
+    return np.concatenate([np.zeros(0, np.int64), *found])
+
+
+def _lines_of_points(text: bytes, spans: list[tuple[int, int]], real: Array, ends: Array, line_of: Array) -> Array:
+    """Lines of the plain points: all line ends (`real`) but those of other records, and those that only continue."""
     if not text.endswith(b"\n"):
         real = np.append(real, len(text))
     other = np.array([last for _, last in spans], np.int64)
@@ -241,14 +247,19 @@ def _piece(text: bytes, first: int, parts: list[tuple[bytes, Array]], some: bool
         parts.append((text, np.arange(first, first + _ends(text) + 1)))
 
 
-def _numbers(text: bytes) -> Array:
-    """(N, 6) of plain GOTO lines."""
-    found, at = [np.zeros((0, 6))], 0
-    while at < len(text):
-        stop = text.find(b"\n", min(at + _CHUNK, len(text) - 1)) + 1 or len(text)
-        found.append(_some_numbers(text[at:stop]))
-        at = stop
-    return np.concatenate(found)
+def _numbers(text: memoryview, kept: list[tuple[int, int]]) -> Array:
+    """(N, 6) of the plain GOTO lines between places of a text, few at a time."""
+    found, some, size = [np.zeros((0, 6))], list[bytes](), 0
+    for first, last in kept:
+        while first < last:
+            lines = bytes(text[first:min(last, first + _CHUNK)])
+            whole = len(lines) if first + len(lines) == last else lines.rfind(b"\n") + 1 or last - first
+            some.append(lines[:whole] if whole <= len(lines) else bytes(text[first:last]))
+            size, first = size + whole, first + whole
+            if size >= _CHUNK >> 2:
+                found.append(_some_numbers(b"".join(some)))
+                some, size = [], 0
+    return np.concatenate([*found, _some_numbers(b"".join(some))])
 
 
 _TO_COMMAS = bytes.maketrans(b"\n", b",")

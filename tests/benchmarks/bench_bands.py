@@ -12,6 +12,9 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 
@@ -26,10 +29,12 @@ from tests.postproc.time_kit import blocks, machine, model
 MACHINE = "mikron-ucp710"
 SORTS = ("zigzag", "waves", "arcs", "rapids", "facing", "turning")
 CLOCK = 0.002
+CYCLE = 0.006
+"""s of interpolation of the executed control: a third of the cycles of its file, and of the time that a fit takes"""
 
 
 @cache
-def program(sort: str, seed: int, size: int = 120) -> MotionBlocks:
+def program(sort: str, seed: int, size: int = 30) -> MotionBlocks:
     """A program of one kind, from a seed."""
     rng = np.random.default_rng(1000 * SORTS.index(sort) + seed)
     text = ["G21 G90 G94 G17", "G0 X0 Y0 Z100", f"F{rng.choice([1200, 3000, 6000])}"]
@@ -73,6 +78,8 @@ def control(rng: np.random.Generator, kind: int) -> tuple[CycleTimeModel, float]
         values |= {"corner_step": 8.0 * np.exp(rng.normal(0, 0.5)), "smoothing": 0.002 * rng.integers(0, 12)}
     if kind == 5:
         values |= {"bend_acceleration": rng.uniform(0.4, 0.95), "bend_jerk": rng.uniform(0.4, 0.95)}
+    if kind > 3:
+        values["cycle"] = CYCLE
     name = "linuxcnc" if kind == 0 else "control" if kind > 3 else "lookahead"
     chosen = model(name).model_copy(update={k: float(v) for k, v in values.items()} | {"jerk": kind != 1})
     return chosen, 0.5 if kind == 3 else 0.0
@@ -98,7 +105,7 @@ def fitted(seen: tuple[str, ...], truth: CycleTimeModel, bend: float, rng: np.ra
         run, found = run_of_log(b, RunLog(line, stamps, np.full((len(line), 5), np.nan), line))
         assert run is not None, found
         runs.append(run)
-    begin = model("lookahead" if truth.kind == "control" else "control")
+    begin = model("lookahead") if truth.kind == "control" else model("control").model_copy(update={"cycle": CYCLE})
     fit, _ = calibrate(runs, begin, "log.csv", machine(MACHINE))
     return fit.model if fit is not None else None
 
@@ -141,4 +148,4 @@ def main(controls: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 12)
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 6)

@@ -2,14 +2,17 @@
 
     python tests/benchmarks/bench_batch.py [RUNS]
 
-Prints the wall time of RUNS conversions (default 60) in this process and on two warm workers, how long the scheduler takes
-for a task that is done already, and what these figures give for 10,000 runs on 64 and 1000 workers: tasks go to the worker
-that is free first, the scheduler hands out one after the other.
+Prints wall and processor time of RUNS conversions (default 60) in this process and on two warm workers, the load of the
+computer (above 1 wall times are no measure; processor times are), how long the scheduler takes for a task that is done
+already, and what these figures give for 10,000 runs on 64 and 1000 workers: tasks go to the worker that is free first, the
+scheduler hands out one after the other.
 """
 
 from __future__ import annotations
 
 import heapq
+import os
+import resource
 import sys
 import tempfile
 import time
@@ -49,6 +52,12 @@ def scheduled(seconds: Sequence[float], workers: int, handing_out: float) -> flo
     return max(free)
 
 
+def processor() -> float:
+    """Seconds of processor of this process and of those that have ended below it."""
+    own, ended = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return own.ru_utime + own.ru_stime + ended.ru_utime + ended.ru_stime
+
+
 def timed(folder: Path, jobs: str, runner: Runner, where: Where) -> tuple[float, list[float]]:
     """Wall time of a batch, and seconds of each of its tasks."""
     tasks = with_keys(batch_folder(folder, jobs))
@@ -65,8 +74,10 @@ def main(count: int) -> None:
     figures = []
     for where in (Where(1), Where(2)):
         with tempfile.TemporaryDirectory() as folder:
+            before, load = processor(), os.getloadavg()[0]
             figures.append(timed(Path(folder), jobs, run_command, where))
-            print(f"{where.workers} worker(s): {len(figures[-1][1])} runs in {figures[-1][0]:.1f} s")
+            print(f"{where.workers} worker(s): {len(figures[-1][1])} runs in {figures[-1][0]:.1f} s, "
+                  f"{processor() - before:.1f} s of processor; load before {load:.1f}", flush=True)
     few = JOBS.format(setup=ROOT / "samples" / "tools.setup.toml", files=[str(ROOT / "samples" / "pocket.cls")],
                       tolerances=", ".join(f"{0.01 + 1e-5 * k:g}" for k in range(400)))
     with tempfile.TemporaryDirectory() as folder:

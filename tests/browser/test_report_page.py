@@ -368,7 +368,7 @@ def test_axes_that_turn_along_a_cut_are_shown_and_not_called_fixed(opened: Sessi
     settled(page)
     keys, said = read_back(page, along()), page.inner_text("#orientation-body")
     base = "runs.0.conversion.orientation.turning."
-    assert {base + "cuts.0.turned_deg", base + "cuts.0.ball_off_path_mm", base + "on_the_control.gain_percent"} <= keys
+    assert {base + "cuts.0.turned_deg", base + "cuts.0.off_path_mm", base + "on_the_control.gain_percent"} <= keys
     assert any(key.startswith("runs.0.conversion.time.limiting.") for key in keys), "which axis is the slowest"
     assert "turned along 1 of 1 cuts" in said and "keeps its axes: the tool axis turns within the pass" in said
     assert page.locator("#polytope").count() == 0, "of one fixed axis, which this pass has not"

@@ -1,4 +1,4 @@
-"""Commands and Python blocks of the documentation do what the page says; commands of READMEs are such as there are."""
+"""Commands and Python blocks of the documentation and of READMEs do what the page says."""
 
 from __future__ import annotations
 
@@ -11,23 +11,52 @@ from typing import Any, get_args
 import pytest
 from typer.main import get_command
 
+from machines.geometric_error.exchange import survey
 from postproc.cli.app import app
 from postproc.cli.batch import wrong_use
 from postproc.explain.pages import pages
 from postproc.setup.model import load_setup
-from tests.docs.page import ROOT, blocks
+from tests.docs.page import PLAIN, ROOT, blocks
 from tests.docs.page import faults as faults_of
 from toolpaths.plug_ins import PlugInGroup
 
 PAGES = sorted(p for p in (ROOT / "docs").rglob("*.md") if "generated" not in p.parts and p.name != "python.md")
 READMES = sorted(p for p in (*ROOT.glob("*.md"), *(p for top in ("toolpaths", "machines", "postproc", "samples", "tests")
                  for p in (ROOT / top).rglob("*.md")), *PAGES) if p.name != "CHANGELOG.md")
+ELSEWHERE = {"samples/plugins/README.md": "tests/plugins/test_sample_plug_ins.py",
+             "docs/explanation/live-reports.md": "tests/docs/test_live_reports.py"}
+"""pages whose commands another test runs: with the package installed; as the site is built"""
+EXECUTED = [page for page in READMES if page.relative_to(ROOT).as_posix() not in ELSEWHERE
+            and any(block.kind in ("console", "python", *PLAIN) for block in blocks(page.read_text("utf-8")))]
 HOW_TOS = 20
 
 
-@pytest.mark.parametrize("page", PAGES, ids=[str(p.relative_to(ROOT / "docs")) for p in PAGES])
-def test_a_page_does_what_it_says(page: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("page", EXECUTED, ids=[str(p.relative_to(ROOT)) for p in EXECUTED])
+def test_a_page_does_what_it_says(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(survey, "PLACES", 1000)  # where `errors` looks at a model
     assert faults_of(page, tmp_path) == []
+
+
+def test_no_command_and_no_python_is_left_out() -> None:
+    """Commands stand in blocks that run, not in indented text; what runs elsewhere is named there."""
+    for page in READMES:
+        text = page.read_text("utf-8")
+        fenced = "".join(block.text for block in blocks(text))
+        assert not re.search(r"^(?: {4}|\t)(?:\$ )?postproc ", text.replace(fenced, ""), re.MULTILINE), page
+        kinds = {block.kind for block in blocks(text) if not block.file and "postproc " in block.text}
+        assert kinds <= {"console", "python", "toml", "ini", *PLAIN}, page
+    for page, test in ELSEWHERE.items():
+        assert Path(page).name in (ROOT / test).read_text("utf-8"), page
+
+
+def test_a_command_of_a_readme_that_fails_is_noticed(tmp_path: Path) -> None:
+    page = tmp_path / "README.md"
+    page.write_text("```sh\npostproc inspect part.cls   # what it holds\npostproc inspect ... --json -\n```\n", "utf-8")
+    assert faults_of(page, tmp_path) == []
+    page.write_text("```sh\npostproc machine show no-such-machine\n```\n", encoding="utf-8")
+    assert len(faults_of(page, tmp_path)) == 1
+    page.write_text("```python\nimport toolpaths\ntoolpaths.raed('part.cls')\n```\n", encoding="utf-8")
+    assert len(faults_of(page, tmp_path)) == 1
 
 
 def test_a_page_that_is_wrong_is_noticed(tmp_path: Path) -> None:

@@ -39,7 +39,9 @@ SAMPLES = ROOT / "samples"
 ENDINGS = frozenset({".cls", ".cl", ".apt", ".aptsource", ".clt", ".ncl", ".as", ".ncd", ".tap", ".txt", ".cldata"})
 SETUPS = (("h4a", "h4a.setup.toml"), ("delta", "delta.setup.toml"), ("uranesx", "delta.setup.toml"),
           ("", "tools.setup.toml"))
-"""set-up by how the machine's name begins, unless FILE.setup.toml or FOLDER.setup.toml stands with the file"""
+"""set-up by how the machine's name begins, unless `places/MACHINE.toml` stands here, FILE.setup.toml or FOLDER.setup.toml
+with the file: a machine on legs reaches the place of `places` and hardly that of another machine"""
+PARTS, PLACES = Path(__file__).parent / "parts", Path(__file__).parent / "places"
 LONGEST = 900
 """s that one conversion may take, edits included"""
 PROVED, REFUSED, INTERNAL, ENDLESS, NUMBERS = "written and proved", "refused", "INTERNAL ERROR", "NO END", "number warning"
@@ -65,8 +67,9 @@ class Task:
 
 
 def files_of(folder: Path | None) -> list[Path]:
-    """The samples, and all files of the folder, however they are called."""
-    found = sorted(p for p in SAMPLES.rglob("*") if p.suffix.lower() in ENDINGS and "errors" not in p.parts)
+    """The samples, the parts that machines on legs can tilt to, and all files of the folder, however they are called."""
+    found = sorted(p for at in (SAMPLES, PARTS) for p in at.rglob("*")
+                   if p.suffix.lower() in ENDINGS and "errors" not in p.parts)
     more = folder.rglob("*") if folder else ()
     return found + sorted(p for p in more if p.is_file() and not p.name.endswith(".setup.toml"))
 
@@ -187,6 +190,8 @@ def _machine(name: str, setup: str) -> Any:
 
 
 def _setup_of(task: Task) -> Path:
+    if (reached := PLACES / f"{task.machine}.toml").is_file():
+        return reached
     for stem in (task.file.stem, task.file.parent.name):
         if (own := task.file.with_name(f"{stem}.setup.toml")).is_file():
             return own
@@ -212,6 +217,16 @@ def table(found: Counter[tuple[str, str, str]]) -> str:
         lines += [f"{count:14} {detail}  ({example[k, detail]})" for (k, detail), count in by.most_common()
                   if k == kind and detail]
     return "\n".join(lines)
+
+
+def by_machine(found: Counter[tuple[str, str, str]]) -> str:
+    """Written and refused of each machine: one for which nothing is written shows nothing."""
+    made: dict[str, Counter[str]] = {}
+    for (kind, _, where), count in found.items():
+        if kind in (PROVED, REFUSED):
+            made.setdefault(where.split(" on ")[-1].split(",")[0], Counter())[kind] += count
+    return "\n".join(f"{name:26} {n[PROVED]:5} written {n[REFUSED]:5} refused{'' if n[PROVED] else ': shows nothing'}"
+                     for name, n in sorted(made.items()))
 
 
 def failures(found: Counter[tuple[str, str, str]]) -> int:
@@ -277,6 +292,7 @@ def main() -> int:
              for machine in (_first(file, a.machine, a.controller) if a.first else a.machine)]
     found = run(tasks, a.workers)
     print(table(found))
+    print(by_machine(found))
     print(f"{failures(found)} failures")
     return 1 if failures(found) else 0
 

@@ -8,8 +8,10 @@ from pathlib import Path
 
 import pytest
 
+import machines
 from postproc.base.options import Options
 from postproc.pipeline.result import PostResult
+from postproc.setup.model import load_setup
 from tests.hard import run
 from tests.hard.run import INTERNAL, NO_HINT, PROVED, REFUSED, REFUSES_MORE, Task, failures, files_of, table, worked
 from tests.postproc.kit import SAMPLES
@@ -30,6 +32,7 @@ def test_outcomes(tmp_path: Path) -> None:
     found = worked(Task(spoilt, "mill-3axis", ("siemens-840d", "heidenhain-tnc640"), 0))
     assert kinds(found) == {REFUSED: 2} and failures(found) == 0
     assert "cl.cycle-depth" in table(found)
+    assert run.by_machine(found).split() == ["mill-3axis", "0", "written", "2", "refused:", "shows", "nothing"]
 
 
 def test_faults_are_failures(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -60,4 +63,11 @@ def test_all_samples_and_the_files_of_a_folder_are_taken(tmp_path: Path) -> None
     (tmp_path / "deep").mkdir()
     (tmp_path / "deep" / "part").write_text("x")
     files = files_of(tmp_path)
-    assert {p.name for p in files} >= {"pocket.cls", "inch_plate.apt", "catia.aptsource", "solidworks.clt", "ncl.as", "part"}
+    assert {p.name for p in files} >= {"pocket.cls", "inch_plate.apt", "catia.aptsource", "solidworks.clt", "ncl.as", "part",
+                                     "leaning.cls"}
+
+
+def test_places_are_of_machines_and_stand_before_the_other_set_ups() -> None:
+    at = {file.stem: file for file in run.PLACES.glob("*.toml")}
+    assert set(at) <= set(machines.names()) and load_setup(str(at["hexapod"]))[0].part.origin == (0.0, 0.0, -150.0)
+    assert run._setup_of(Task(SAMPLES / "casting" / "casting.ncl", "hexapod", (), 0)) == at["hexapod"]

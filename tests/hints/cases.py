@@ -18,10 +18,11 @@ from tests.hints.machine_cases import MACHINE
 from tests.hints.macro_cases import MACROS
 from tests.hints.own_room_cases import OWN_ROOMS
 from tests.hints.package_cases import PACKAGES
+from tests.hints.passed_on_cases import PASSED_ON
 from tests.hints.place_cases import PLACE
 from tests.hints.rare_cases import RARE
 from tests.hints.tool_cases import TOOLS
 from tests.hints.verify_cases import VERIFY
 
 CASES = [*CL, *IMPORTS, *CL_WORDS, *MACHINE, *TOOLS, *CONVERT, *GCODE, *ERRORS, *FILE, *ALIGN, *PLACE, *VERIFY, *EXCHANGE,
-         *OWN_ROOMS, *MACROS, *BATCH, *DESIGN, *PACKAGES, *CALIBRATION, *RARE]
+         *OWN_ROOMS, *MACROS, *BATCH, *DESIGN, *PACKAGES, *CALIBRATION, *RARE, *PASSED_ON]

@@ -28,7 +28,7 @@ DESIGN = [
              "ask for a smaller (--margin)", (Edit(COMMAND, "0.3836634533", "0.3"),)),
     HintCase("certificate.file", "machine certify --check c.json", {"c.json": "{}"},
              "write one with postproc (machine certify) NAME -o CERT.json",
-             (Edit(COMMAND, "machine certify --check c.json", r"\1 uranesx -o c.json"),)),
+             (Edit(COMMAND, "machine certify --check c.json", r"\1 uranesx --box=-9:9,-9:9,-209:-200 -o c.json"),)),
     HintCase("dynamics.missing", "machine forces m.toml", {"m.toml": 'base = "mill-3axis"\n'},
              r"add (\[dynamics)\], with \[dynamics(\.axes\.)LETTER\] for each axis: (mass), (force)",
              (Edit("m.toml", "", r"\1\2Z]\n\3 = 40\n\4 = 900\n"),)),

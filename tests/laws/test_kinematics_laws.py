@@ -9,7 +9,7 @@ from machines.kinematics.serial import Serial
 from tests.machines.own_kinds import OWN
 
 pytestmark = pytest.mark.parametrize("name", [*machines.names(), *OWN])
-MANY = 5_000
+MANY = 2_000
 
 
 def test_forward_of_inverse_is_identity(name):

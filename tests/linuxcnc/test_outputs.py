@@ -34,7 +34,7 @@ MADE = {"bicubic.cls": ("mill-3axis", "planar-delta-z"), "blade.cls": ("linuxcnc
         "h4a_dome.cls": ("mikron-ucp710",), "h4a_indexed.cls": ("head-table",),
         "inch_plate.apt": ("rotary-delta", "triaglide", "delta-cone", "delta-hybrid"),
         "indexed_4axis.cls": ("mill-4axis",),
-        "pocket.cls": ("uranesx", "linuxcnc-lineardelta", "tilting-arms-c-table", "three-arms-three-slides"),
+        "pocket.cls": ("uranesx", "linuxcnc-lineardelta", "tilting-arms-c-table"),
         "test_part.cls": ("delta-parallel-x",),
         "tool_axis_tour.apt": ("linuxcnc-xyzac-trt", "fork-head-ab")}
 """machines on which each sample is made: every sample, with MORE every machine whose letters LinuxCNC's interpreter has"""
@@ -52,7 +52,7 @@ MORE = {"bicubic.cls": ("uranesx",), "blade.cls": ("head-table",),
         "inch_plate.apt": ("nutating-head", "mill-4axis", "delta-coplanar", "delta-parallel-x-compact", "delta-parallel-z",
                            "delta-parallel-z-compact", "delta-star", "delta-perpendicular", "linear-delta-ac", "tricept"),
         "pocket.cls": ("mill-3axis", "mikron-ucp710", "rotary-delta", "triaglide", "delta-cone", "delta-coplanar",
-                       "delta-hybrid"),
+                       "delta-hybrid", "three-arms-three-slides"),
         "test_part.cls": ("mill-3axis", "trunnion-bc", "delta-parallel-x-compact", "delta-parallel-z",
                           "delta-parallel-z-compact", "delta-star")}
 """further ones, with -m slow"""

@@ -22,6 +22,7 @@ from postproc.orientation.passes.passes import work_of
 from postproc.page.document import document
 from postproc.page.tabs import ReportTab, TabTable, with_tabs
 from postproc.setup.model import load_setup
+from tests.docs.page import faults
 from tests.postproc.kit import machine
 from toolpaths.choices import ShopName
 from toolpaths.diagnostics import Severity
@@ -99,6 +100,10 @@ def test_a_file_of_the_shop_converts_on_the_machine_of_the_shop(shop: Path, tmp_
     np.testing.assert_array_equal(path.tip[-5:-1], [[40, 0, -2], [40, 25, -2], [0, 25, -2], [0, 0, -2]])
     assert "not compared records of the CL file" in run("convert", part, "-m", "mill-3axis", *ON, "-o", tmp_path / "q.ngc",
                                                         "--require-proof", code=1)
+
+
+def test_the_commands_of_the_readme_run(shop: Path, tmp_path: Path) -> None:
+    assert faults(FOLDER / "README.md", tmp_path) == [] and (tmp_path / "out/p.ngc").exists()
 
 
 def test_code_that_has_changed_since_is_named(shop: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -155,3 +155,10 @@ def test_a_frozen_class_derives_from_no_other() -> None:
 
     with pytest.raises(TypeError, match="cannot inherit frozen"):
         dataclass(frozen=True)(type("Frozen", (Loose,), {"__annotations__": {"b": "int"}}))
+
+
+@pytest.mark.parametrize("default", [3, field(default=3), field(default_factory=int)])
+def test_a_field_without_a_default_behind_one_with_one_is_refused(default: object) -> None:
+    fields = {"__annotations__": {"a": int, "b": int}, "a": default}
+    refusals = [outcome(lambda make=make: make(frozen=True)(type("Behind", (), dict(fields)))) for make in MAKERS]
+    assert refusals == [("TypeError", "non-default argument 'b' follows default argument")] * 2

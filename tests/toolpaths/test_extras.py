@@ -25,6 +25,12 @@ def _without(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", found)
 
 
+def test_a_check_without_toppra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _without("toppra", monkeypatch)
+    ran = run_command(["time", str(tmp_path / "none.cls"), "-m", "mill-3axis", "--check", "toppra"])
+    assert ran.code == 1 and "pip install 'postproc[check]'" in ran.said[-1], ran.said
+
+
 @pytest.mark.parametrize("words", [
     "machine show hexapod --figure out.svg",
     f"errors check {SAMPLES}/errors/mikron-ucp710.toml -m mikron-ucp710 --figure out.png",

@@ -13,21 +13,27 @@ counts; R_k: z along the line of the drive, x from the rail to the joint, of an 
 
 Six rods hold a platform in space, two pairs more than hold one in its plane (the turn about z is what they have in common):
 then the rods share what is too much, by least squares of their stretches. Where the file gives fewer rods, what holds the
-platform otherwise is perfect: it keeps its freedoms. So it is where legs hold bars of the platform: each pair is one rod in
-its middle, and a bar keeps its direction.
+platform otherwise is perfect: it keeps its freedoms. Where legs hold bars of the platform, rods that are as many as its
+motions and the hinges of the bars are closed with these (`bar_loops.py`); else each pair is one rod in its middle, and a bar
+keeps its direction. Hinges of legs, rings and passive legs have errors of their own (`bearings.py`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
-from machines.geometric_error.actual.rods import RodErrors, guide_frame, inverted
+from machines.geometric_error.actual.bar_loops import BarLoops, bar_loops
+from machines.geometric_error.actual.bearings import bearing_names, held_with, rings_with
+from machines.geometric_error.actual.rods import RODS, RodErrors, guide_frame, inverted
 from machines.geometric_error.actual.transforms import turns
 from machines.kinematics.base import Kinematics
 from machines.kinematics.columns import blocks
+from machines.kinematics.legs.drives import Drives
+from machines.kinematics.legs.holds import Holds
 from machines.kinematics.legs.in_series import LegsInSeries
 from machines.kinematics.legs.loops import FREEDOMS, Loops, turned
 from machines.kinematics.legs.on_legs import OnLegs
@@ -41,6 +47,8 @@ STEPS = 20
 """of the least squares, at most"""
 STILL = 1e-11
 """mm: a last step of them"""
+SMALL = 1e-3
+"""mm and rad of the differences by which bearings count: what they do is all but linear"""
 HELD = 1e-6
 """smallest singular value of the rods' rows, each of length about 1, with which they hold a platform"""
 
@@ -75,10 +83,29 @@ class LegFrame:
         count = [int(np.sum(self.leg[:r] == k)) + 1 for r, k in enumerate(self.leg)]
         names = tuple(f"{self.letters[k]}{number}" for k, number in zip(self.leg, count, strict=True))
         arms = tuple(name for name, arm in zip(self.letters, self.machine.legs.arm, strict=True) if arm)
-        return replace(RodErrors.none(self.letters, names), drive=np.zeros(len(self.letters)), arms=arms)
+        bearings = bearing_names(self.machine.loops, self.letters, self.on_bars)
+        return replace(RodErrors.none(self.letters, names), drive=np.zeros(len(self.letters)), arms=arms,
+                       bearings=np.zeros(len(bearings)), bearing_names=bearings)
+
+    @property
+    def on_bars(self) -> bool:
+        """True where the rods of bars are closed exactly."""
+        return bool(self.machine.loops.bars) and len(self.leg) == RODS + len(self.machine.loops.bar_names)
+
+    def bars(self, errors: RodErrors) -> BarLoops:
+        """The rods with their errors, where `on_bars`."""
+        kept, loops = self.machine.loops.kept, self.machine.loops
+        held = np.array(loops.bars)[self.leg] >= 0
+        joints = np.where(held[:, None], 0.0 if kept is None else kept[self.leg], loops.joints[self.leg])
+        return bar_loops(loops, joints + self.shift + errors.platform, self._rods(errors), errors, self.leg)
 
     def loops(self, errors: RodErrors) -> Loops:
         """Every rod as a leg of its own, with its errors: joints (N, K) of the machine drive them as q[:, leg]."""
+        rods, nominal = self._rods(errors), self.machine.loops
+        return replace(nominal, drives=rods, joints=self._joints + errors.platform, freedoms=self.freedoms,
+                       rings=rings_with(nominal, errors, self.leg), holds=held_with(nominal, errors, rods, self.leg))
+
+    def _rods(self, errors: RodErrors) -> Drives:
         drives, leg, spun = self.machine.legs, self.leg, turns(errors.guide)
         guide = spun[leg]
         along = np.einsum("rij,rj->ri", guide, drives.directions[leg])
@@ -91,15 +118,8 @@ class LegFrame:
         feet = feet + np.where(arm[:, None], aside, own) + (slide * more)[:, None] * along
         reach = np.where(arm[:, None], (turned(more[:, None] * along) @ (reach - aside)[:, :, None])[:, :, 0], 0.0)
         length = drives.lengths[leg] + errors.length + drives.stretch[leg] * more
-        rods = replace(drives, points=feet, directions=along, lengths=length, roots=drives.roots[leg], arms=reach,
+        return replace(drives, points=feet, directions=along, lengths=length, roots=drives.roots[leg], arms=reach,
                        slide=slide, arm=arm)
-        return replace(self.machine.loops, drives=rods, joints=self._joints + errors.platform, freedoms=self.freedoms,
-                       rings=self._rings)
-
-    @property
-    def _rings(self) -> Floats | None:
-        rings = self.machine.loops.rings
-        return None if rings is None else rings[self.leg]
 
     @property
     def _joints(self) -> Floats:
@@ -108,6 +128,8 @@ class LegFrame:
     @cached_property
     def freedoms(self) -> tuple[str, ...]:
         """Of the platform on its rods alone, where they hold it: all, in the plane x y c; else those of the machine."""
+        if self.on_bars:
+            return FREEDOMS
         own = self.machine.loops.freedoms
         free = ("x", "y", "c") if "z" not in own else FREEDOMS
         place, turn, q = (part[None] for part in self.machine.home)
@@ -115,7 +137,8 @@ class LegFrame:
         rods = replace(drives, points=drives.points[leg] + self.shift, directions=drives.directions[leg],
                        lengths=drives.lengths[leg], roots=drives.roots[leg], arms=drives.arms[leg],
                        slide=drives.slide[leg], arm=drives.arm[leg])
-        loops = replace(self.machine.loops, drives=rods, joints=self._joints, freedoms=free, rings=self._rings)
+        loops = replace(self.machine.loops, drives=rods, joints=self._joints, freedoms=free,
+                        rings=None if self.machine.loops.rings is None else self.machine.loops.rings[leg])
         rows = loops.matrix_at(place, turn, q[:, leg])[0][0] / loops.sizes(q[:, leg])[0][:, None]
         held = len(rows) >= len(free) and np.linalg.svd(rows, compute_uv=False)[-1] > HELD
         return free if held else own
@@ -123,6 +146,8 @@ class LegFrame:
     @property
     def square(self) -> bool:
         """True where rods, and what holds the platform besides, are as many as its freedoms."""
+        if self.on_bars:
+            return True
         holds = self.machine.loops.holds
         return len(self.leg) + (0 if holds is None else holds.count) == len(self.freedoms)
 
@@ -131,6 +156,8 @@ class LegFrame:
 
         From the nominal platform `place` (N, 3), `turn` (N, 3, 3); NaN where the rods do not close.
         """
+        if self.on_bars:
+            return self.bars(errors).solve(q[:, self.leg], place, turn)[:2]
         loops, place, turn = self.loops(errors), place.copy(), np.array(turn)
         for part in blocks(len(q)):
             rods = q[part][:, self.leg]
@@ -143,19 +170,58 @@ class LegFrame:
 
     def platform_sensitivity(self, q: Floats, place: Floats, turn: Floats) -> Floats:
         """d(X, turn)/dE (N, 6, P): T^-1 S of E-15, in the order of `RodErrors.names`; of least squares T^+ S."""
+        if self.on_bars:
+            return self._sensitivity_of_bars(q, place, turn)
         loops = self.loops(self.zero)
         rows, rods = loops.matrix_at(place, turn, q[:, self.leg])
         span = loops.sizes(q[:, self.leg])
-        rows, s = rows / span[:, :, None], self._columns(loops, q, rods, turn) / span[:, :len(self.leg), None]
-        s = np.pad(s, ((0, 0), (0, rows.shape[1] - s.shape[1]), (0, 0)))
+        s = self._columns(loops.drives, q, rods, np.repeat(turn[:, None], len(self.leg), axis=1))
+        if loops.holds is not None:
+            s = np.concatenate([s, loops.weight * self._of_holds(loops.holds, q, rods, turn)], axis=1)
+        own = q[:, self.leg]
+        s = np.concatenate([s, self._of_bearings(lambda errors: _gaps(self.loops(errors), place, turn, own))], axis=2)
+        rows, s = rows / span[:, :, None], s / span[:, :, None]
         if rows.shape[1] == rows.shape[2]:
             return loops.twists(inverted(rows) @ s)
         across = np.swapaxes(rows, 1, 2)
         return loops.twists(inverted(across @ rows) @ (across @ s))
 
-    def _columns(self, loops: Loops, q: Floats, rods: Floats, turn: Floats) -> Floats:
-        """S (N, R, P): r . dA - r . R dB + l dl for every parameter."""
-        n, (k, r), drives = len(q), (len(self.letters), len(self.leg)), loops.drives
+    def _sensitivity_of_bars(self, q: Floats, place: Floats, turn: Floats) -> Floats:
+        loops, own = self.bars(self.zero), q[:, self.leg]
+        swing = loops.swing_at(turn)
+        rows, rods = loops.matrix_at(place, turn, swing, own)
+        s = self._columns(loops.drives, q, rods, loops.arms(turn, swing)[2])
+        more = self._of_bearings(lambda errors: self.bars(errors).gaps(place, turn, swing, own))
+        shift, twist, _ = loops.rates(rows, np.concatenate([s, more], axis=2))
+        return np.concatenate([shift, twist], axis=1)
+
+    def _of_bearings(self, gaps: Callable[[RodErrors], Floats]) -> Floats:
+        """(N, R, B) what loops close by per error of each bearing: minus central differences of their gaps."""
+        zero, found = self.zero, list[Floats]()
+        first = len(zero.values) - len(zero.bearings)
+        for k in range(len(zero.bearings)):
+            one = SMALL * np.eye(len(zero.values))[first + k]
+            found.append((gaps(zero.with_values(-one)) - gaps(zero.with_values(one))) / (2.0 * SMALL))
+        return np.stack(found, axis=2) if found else np.zeros((*gaps(zero).shape, 0))
+
+    def _of_holds(self, holds: Holds, q: Floats, rods: Floats, turn: Floats) -> Floats:
+        """(N, H, P) mm of what holds the platform per error of the rods: joint and foot of a leg in the plane of its hinge,
+        which turns with the guide."""
+        count = len(self.zero.values) - len(self.zero.bearings)
+        result = np.zeros((len(q), holds.count, count))
+        drives = self._rods(self.zero)
+        for row, k in enumerate(self.machine.loops.hinged, len(self.machine.loops.passive)):
+            rod, normal = int(np.argmax(self.leg == k)), holds.normals[row]
+            along = np.broadcast_to(normal, (len(q), len(self.leg), 3))
+            body = np.repeat(turn[:, None], len(self.leg), axis=1)
+            result[:, row] = self._columns(drives, q, along, body, 0.0)[:, rod]
+            first = 3 * (len(self.letters) + k)
+            result[:, row, first:first + 3] += np.cross(rods[:, rod], normal)
+        return result
+
+    def _columns(self, drives: Drives, q: Floats, rods: Floats, body: Floats, stretched: float = 1.0) -> Floats:
+        """S (N, R, P): r . dA - r . R dB + l dl for every parameter, R (N, R, 3, 3) the turn of what each rod ends on."""
+        n, (k, r) = len(q), (len(self.letters), len(self.leg))
         rail, guide, own, ends = (np.zeros((n, r, count, 3)) for count in (k, k, r, r))
         length, more = np.zeros((n, r, r)), np.zeros((n, r, k))
         own_q = q[:, self.leg]
@@ -167,10 +233,17 @@ class LegFrame:
             if drives.arm[j]:
                 frame = turned(own_q[:, j, None] * drives.directions[j]) @ frame
             own[:, j, j] = np.einsum("ni,nij->nj", rods[:, j], frame)
-            ends[:, j, j] = -np.einsum("ni,nij->nj", rods[:, j], turn)
-            length[:, j, j] = drives.spans(own_q)[:, j]
+            ends[:, j, j] = -np.einsum("ni,nij->nj", rods[:, j], body[:, j])
+            length[:, j, j] = stretched * drives.spans(own_q)[:, j]
             more[:, j, leg] = dot(rods[:, j], at[:, j]) + drives.stretch[j] * length[:, j, j]
         return np.concatenate([part.reshape(n, r, -1) for part in (rail, guide, own, ends, length, more)], axis=2)
+
+
+def _gaps(loops: Loops, place: Floats, turn: Floats, q: Floats) -> Floats:
+    """(N, R + H) mm2: what rods and holds miss, those by their weight."""
+    rods = loops.ends(place, turn) - loops.drives.feet(q)
+    gap = 0.5 * (dot(rods, rods) - loops.drives.spans(q) ** 2)
+    return gap if loops.holds is None else np.hstack([gap, loops.weight * loops.held_gaps(place, turn, q)])
 
 
 def shared(loops: Loops, q: Floats, place: Floats, turn: Floats) -> tuple[Floats, Floats]:
@@ -183,7 +256,7 @@ def shared(loops: Loops, q: Floats, place: Floats, turn: Floats) -> tuple[Floats
         across = np.swapaxes(rows, 1, 2)
         stretch = 0.5 * (dot(rods, rods) / span - span)
         if loops.holds is not None:
-            stretch = np.hstack([stretch, loops.holds.gaps(place, turn)])
+            stretch = np.hstack([stretch, loops.held_gaps(place, turn, q)])
         step = loops.twists(-(inverted(across @ rows) @ (across @ stretch[:, :, None]))[:, :, 0])
         place, turn = place + step[:, :3], turned(step[:, 3:]) @ turn
         last = np.maximum(lengths(step[:, :3]), loops.lever * lengths(step[:, 3:]))
@@ -194,13 +267,12 @@ def shared(loops: Loops, q: Floats, place: Floats, turn: Floats) -> tuple[Floats
 
 
 def leg_frame(machine: OnLegs) -> LegFrame:
-    """The rods of a machine; a leg without `rods` has one, on its line, and so has one that holds a bar of the platform.
-
-    A bar keeps its direction whatever the errors: of what its two pairs would turn it by nothing is known.
-    """
+    """The rods of a machine; a leg without `rods` has one, on its line, and so have legs of a platform with bars whose rods
+    are not as many as its motions and hinges: then a bar keeps its direction whatever the errors."""
     drives, sizes, k = machine.legs, machine.clearance, len(machine.leg_names)
     offset = np.zeros((k, 3)) if sizes is None or sizes.rail_offset is None else sizes.rail_offset
-    single = sizes is None or machine.loops.kept is not None
+    bars = len(machine.loops.bar_names)
+    single = sizes is None or (bars > 0 and len(sizes.leg) != RODS + bars)
     leg, shift = (np.arange(k), np.zeros((k, 3))) if sizes is None or single else (sizes.leg, sizes.shift)
     frames = [guide_frame(u, a) if arm else guide_frame(u, -o, machine.workspace.middle - p - o) if slide else np.eye(3)
               for u, a, o, p, arm, slide in zip(drives.directions, drives.arms, offset, drives.points, drives.arm,

@@ -15,11 +15,14 @@ the difference of J with errors and without, exact at q, and what both may chang
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from machines.geometric_error.actual.apart_rates import Apart, Closure
 from machines.geometric_error.actual.error_rates import LARGEST_TURN, AxisSizes, ErrorRates
 from machines.geometric_error.actual.rods import RodErrors, RodFrame, inverted
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Bools, Floats
 from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
@@ -41,6 +44,7 @@ class PlatformMotion:
         shift_change, turn_change: (N, K) by which those may change while the slides go as far as they may
         swing: (N,) rad that the platform may turn by
         about: (3,) the direction of a platform's only turn, which leaves alone what lies along it; None of others
+        closure: of square systems of rods, for what another platform may differ by; None of others
     """
 
     place: Floats
@@ -51,6 +55,7 @@ class PlatformMotion:
     turn_change: Floats
     swing: Floats
     about: Floats | None = None
+    closure: Closure | None = None
 
     def of_point(self, arm: Floats) -> tuple[Floats, Floats]:
         """(mm per mm (N, 3, K), its largest change (N, K)) of the point at `arm` (N, 3) from X, machine frame."""
@@ -67,8 +72,9 @@ class PlatformMotion:
     def translating(self) -> PlatformMotion:
         """Of a platform that does not turn, whatever six rods could do."""
         none = np.zeros(self.turn_change.shape)
+        closure = None if self.closure is None else replace(self.closure, turn=none)
         return PlatformMotion(self.place, self.turned, self.shift, np.zeros(self.turn.shape), self.shift_change, none,
-                              np.zeros(len(none)))
+                              np.zeros(len(none)), closure=closure)
 
 
 def platform_motion(frame: RodFrame, errors: RodErrors, q: Floats, pose: tuple[Floats, Floats],
@@ -90,11 +96,13 @@ def platform_motion(frame: RodFrame, errors: RodErrors, q: Floats, pose: tuple[F
                       np.broadcast_to(frame.length + errors.length, rods.shape[:2]), lever, reach,
                       np.zeros(rods.shape[:2]), np.zeros(rates.shape[:2] + reach.shape[1:]))
     change, swing = loops.held()
-    return PlatformMotion(place, turned, shift, turn, change, change / lever, swing)
+    moves = np.stack([along, np.zeros(along.shape)], axis=1)
+    closure = loops.closure((place, turned, np.concatenate([shift, turn], axis=1)), (rods, ends), (moves, own), change)
+    return PlatformMotion(place, turned, shift, turn, change, change / lever, swing, closure=closure)
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(reach="N H", travels="H", shift="N K")
+@arrays(reach="N H", travels="H", shift="N K", gain="N _ K")
 class HoldRates:
     """Rows of what holds a platform besides its rods (`kinematics/holds.py`), as `HeldLoops` needs them.
 
@@ -103,12 +111,14 @@ class HoldRates:
         reach: (N, H) mm from X
         travels: (H,) 1 of planes that go with the platform
         shift: (N, K) mm of X per mm of each slide
+        gain: (N, H, K) by which D may change in the rows of planes that go through feet
     """
 
     weight: float
     reach: Floats
     travels: Floats
     shift: Floats
+    gain: Floats
 
     def change(self, swing: Floats, drift: Floats, turn: Floats, lever: float) -> tuple[Floats, Floats]:
         """((N, H) what the rows change by, (N, H, K) of (W' - W) J) while the platform turns by `swing` (N,) and X
@@ -116,7 +126,37 @@ class HoldRates:
         arm = self.reach * swing[:, None] + self.travels * drift[:, None]
         aside = self.travels * swing[:, None]
         wrong = self.weight * (aside[:, :, None] * self.shift[:, None] + arm[:, :, None] * turn[:, None])
-        return self.weight * np.hypot(aside, arm / lever), wrong
+        return self.weight * np.hypot(aside, arm / lever), wrong + self.gain
+
+
+@dataclass(frozen=True, eq=False)
+@arrays(radius="R", aside="N R", away="N R", shift="N K")
+class RingRates:
+    """Rods that end on rings round a line of the platform, at the point nearest to their feet, which do not move.
+
+    Attributes:
+        radius: (R,) mm, 0 of rods that end on no ring
+        aside: (N, R) mm from the line to the foot
+        away: (N, R) mm from X to the foot
+        shift: (N, K) mm of X per mm of each drive
+    """
+
+    radius: Floats
+    aside: Floats
+    away: Floats
+    shift: Floats
+
+    def far(self, reach: Floats, shift: Floats, turn: Floats) -> Floats:
+        """(N, R) mm that the feet go past the platform at most, which moves by `shift` and `turn` (N, K) mm and rad at most
+        per mm of each drive."""
+        drift = (shift * reach).sum(axis=1)[:, None]
+        return np.asarray(drift + (turn * reach).sum(axis=1)[:, None] * (self.away + drift))
+
+    def gone_round(self, reach: Floats, assumed: Floats, turn: Floats, lever: float) -> Floats:
+        """(N, R) mm that the ends of rods go round on the platform while drives go by `reach` (N, K) and their columns
+        change by `assumed` (N, K); `turn` (N, K) rad per mm; NaN where the foot may come to the line."""
+        far = self.far(reach, self.shift + assumed, turn + assumed / lever)
+        return np.where(self.radius > 0.0, self.radius * far / np.where(far < self.aside, self.aside - far, np.nan), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +176,7 @@ class HeldLoops:
     bend: Floats
     gain: Floats
     holds: HoldRates | None = None
+    rings: RingRates | None = None
 
     def held(self) -> tuple[Floats, Floats]:
         """(by how much columns of J change at most (N, K), turns times the lever; rad that the platform turns
@@ -152,6 +193,23 @@ class HeldLoops:
             guess = found * _GROWTH + 1e-15
         return change, swing
 
+    def closure(self, at: tuple[Floats, Floats, Floats], rods: tuple[Floats, Floats], drives: tuple[Floats, Bools],
+                change: Floats, stretch: Floats | None = None) -> Closure:
+        """For `Apart`, where columns of J change by `change` (N, K) at most; `at`: place, turn and twists (N, 6, K); `rods`:
+        r and b (N, R, 3); `drives`: what A' is made of (R, 2, 3), and whose own a drive is (R, K)."""
+        (place, turned, columns), (r, b), (moves, own) = at, rods, drives
+        with np.errstate(over="ignore", invalid="ignore"):
+            off, _, swing = self.rows_change(change)
+            least = self.least - np.linalg.norm(off, axis=1)
+            least = np.where(least > 0.0, least, np.nan)
+            ends = np.hypot(1.0, self.arm / self.lever)[:, None] * change[:, None]
+            away = self.turn[:, None] * (self.arm * swing[:, None])[:, :, None]
+            rates = self.rates + ends + away + self.bend[:, :, None]
+            turn, shift = self.turn + change / self.lever, np.linalg.norm(columns[:, :3], axis=1) + change
+        stretch = np.zeros(len(moves)) if stretch is None else stretch
+        return Closure(place, turned, columns, r, b, self.arm, moves, own.astype(np.float64), stretch, self.length, least,
+                       rates, shift, turn, self.lever)
+
     def _change(self, assumed: Floats) -> tuple[Floats, Floats]:
         """The same while columns of J change by up to `assumed`; NaN where there is no bound."""
         with np.errstate(over="ignore", invalid="ignore"):
@@ -164,9 +222,10 @@ class HeldLoops:
         """(mm that rows of W change by (N, R), (D' - D) - (W' - W) J (N, R, K), rad of the platform (N,)) at most."""
         swing = ((self.turn + assumed / self.lever) * self.reach).sum(axis=1)
         drift = (assumed * self.reach).sum(axis=1)[:, None] * np.hypot(1.0, self.arm / self.lever)
-        away = (self.turn * self.reach).sum(axis=1)[:, None] * self.arm * swing[:, None]
-        rod = (self.rates * self.reach[:, None]).sum(axis=2) + drift + away + self.bend
-        arm = self.arm * swing[:, None]
+        gone_round = 0.0 if self.rings is None else self.rings.gone_round(self.reach, assumed, self.turn, self.lever)
+        arm = self.arm * swing[:, None] + gone_round
+        away = (self.turn * self.reach).sum(axis=1)[:, None] * arm
+        rod = (self.rates * self.reach[:, None]).sum(axis=2) + drift + away + self.bend + gone_round
         off = np.hypot(rod, (self.arm * rod + arm * self.length) / self.lever)
         wrong = rod[:, :, None] * self.rates + (self.length * arm)[:, :, None] * self.turn[:, None] + self.gain
         if self.holds is not None:
@@ -249,10 +308,25 @@ def tool_rates(actual: PlatformMotion, nominal: PlatformMotion, arms: tuple[Floa
         rates[k] = rates[k] + (spins[0] + spins[1]) * moved[:, None]
         sizes[k] = sizes[k] + spins[1] * moved[:, None]
     turn_rate = np.linalg.norm(actual.turn - nominal.turn, axis=1) + actual.turn_change + nominal.turn_change
+    if actual.closure is not None and nominal.closure is not None:
+        apart, angles = Apart(actual.closure, nominal.closure, reach).rates()
+        own, turns_apart = nominal.closure.turn, apart / actual.closure.lever
+        for k, (vectors, moved, shifted) in enumerate(((arms, arm_reach, 1.0), (axes, axis_reach, 0.0))):
+            size = np.linalg.norm(vectors[0], axis=1) + moved
+            off = _apart(actual.turned, nominal.turned, vectors) + angles * size + 2.0 * moved
+            with np.errstate(invalid="ignore"):  # where nothing is known infinity meets zero
+                rates[k] = np.fmin(rates[k], shifted * apart + turns_apart * size[:, None] + own * off[:, None])
+        turn_rate = np.fmin(turn_rate, turns_apart)
     tips = actual.place + arms[0] - nominal.place - arms[1]
     angle = np.linalg.norm(np.einsum("nji,njk->nik", nominal.turned, actual.turned) - np.eye(3), axis=(1, 2))
     return ToolRates(rates[0], rates[1], sizes[0], sizes[1], np.linalg.norm(tips, axis=1) + (rates[0] * reach).sum(axis=1),
                       angle + (turn_rate * reach).sum(axis=1))
+
+
+def _apart(one: Floats, other: Floats, vectors: tuple[Floats, Floats]) -> Floats:
+    """(N,) between vectors (N, 3) of two bodies, turned (N, 3, 3), as each has it."""
+    first, second = (np.einsum("nji,nj->ni", turned, v) for turned, v in zip((one, other), vectors, strict=True))
+    return np.asarray(np.linalg.norm(first - second, axis=1))
 
 
 def with_rotary(tool: ToolRates, size: AxisSizes, spindle: AxisSizes, arm: Floats, length: float,

@@ -36,7 +36,8 @@ LEAST_GAIN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(rail="#legs 3", guide="#legs 3", carriage="#rods 3", platform="#rods 3", length="#rods", drive="_")
+@arrays(rail="#legs 3", guide="#legs 3", carriage="#rods 3", platform="#rods 3", length="#rods", drive="_",
+        bearings="#bearing_names")
 class RodErrors:
     """Errors of K legs and R rods, six but of kind "legs", mm and rad; the order of the parameters is that of E-14.
 
@@ -50,6 +51,7 @@ class RodErrors:
         pairs: (K,) mm, half the distance of the rods of each leg where the machine file gives none, else empty
         drive: (K,) by which the drive stands farther than it counts, mm or rad, of kind "legs"; else empty
         arms: legs whose drive counts an angle, by whatever letter
+        bearings: mm or rad of what holds a platform besides its rods, by `bearing_names` (`bearings.py`)
     """
 
     rail: Floats
@@ -62,6 +64,8 @@ class RodErrors:
     pairs: tuple[float, ...] = ()
     drive: Floats = field(default_factory=lambda: np.zeros(0))
     arms: tuple[str, ...] = ()
+    bearings: Floats = field(default_factory=lambda: np.zeros(0))
+    bearing_names: tuple[str, ...] = ()
 
     @classmethod
     def none(cls, legs: tuple[str, ...], rods: tuple[str, ...], pairs: tuple[float, ...] = ()) -> Self:
@@ -75,21 +79,27 @@ class RodErrors:
         return [f"{who}.{what}.{letter}" for what, group in (("rail", self.legs), ("guide", self.legs),
                                                              ("carriage", self.rods), ("platform", self.rods))
                 for who in group for letter in "xyz"] + [f"{rod}.length" for rod in self.rods] + [
-                                                                 f"{leg}.drive" for leg in self.legs[:len(self.drive)]]
+                                                                 f"{leg}.drive" for leg in self.legs[:len(self.drive)]] + [
+                                                                 *self.bearing_names]
 
     @property
     def values(self) -> Floats:
-        """(6 K + 7 R,) and K of the drives: 60 for three legs (E-14), 66 for four."""
+        """(6 K + 7 R,), K of the drives, and bearings: 60 for three legs (E-14), 66 for four."""
         return np.concatenate([getattr(self, name).ravel() for name in ("rail", "guide", "carriage", "platform", "length",
-                                                                        "drive")])
+                                                                        "drive", "bearings")])
 
     def with_values(self, values: Floats) -> Self:
         """The same machine with other parameters (P,)."""
         k, r = len(self.legs), len(self.rods)
-        rail, guide, carriage, platform, length, drive = np.split(np.asarray(values, dtype=np.float64),
-                                                                  np.cumsum([3 * k, 3 * k, 3 * r, 3 * r, r]))
+        parts = np.split(np.asarray(values, dtype=np.float64), np.cumsum([3 * k, 3 * k, 3 * r, 3 * r, r, len(self.drive)]))
+        rail, guide, carriage, platform, length, drive, bearings = parts
         return replace(self, rail=rail.reshape(k, 3), guide=guide.reshape(k, 3), carriage=carriage.reshape(r, 3),
-                       platform=platform.reshape(r, 3), length=length, drive=drive)
+                       platform=platform.reshape(r, 3), length=length, drive=drive, bearings=bearings)
+
+    def bearing(self, name: str) -> Floats:
+        """The errors (n,) of a bearing, mm or rad: of `name` itself, or along or about x, y and z."""
+        found = (k for k, one in enumerate(self.bearing_names) if name in (one, one.rpartition(".")[0]))
+        return np.asarray(self.bearings[list(found)])
 
 
 @dataclass(frozen=True, eq=False)

@@ -127,7 +127,7 @@ def _legs(rods: RodErrors | None) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for name, value in zip(rods.names, rods.values, strict=True):
         turn = angular(name, rods)
-        kind = name.split(".")[1]
+        kind = name.split(".")[-2 if name[-2:] in (".x", ".y", ".z") else -1]
         size = abs(float(value)) / (ARCSEC if turn else UM)
         if size > found.get(kind, {"largest": -1.0})["largest"]:
             found[kind] = {"largest": size, "unit": "arcsec" if turn else "um", "parameter": name}

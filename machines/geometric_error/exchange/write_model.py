@@ -160,7 +160,21 @@ def _leg_lines(rods: RodErrors) -> list[str]:
         lines.append(f"length = {_list(rods.length[mine] / length)}")
         if len(rods.drive):
             lines.append(f"drive = {_number(rods.drive[k] / (angle if leg in rods.arms else length))}")
+        lines += _bearing_lines(rods, f"{leg}.")
+    for table in dict.fromkeys(".".join(name.split(".")[:2]) for name in rods.bearing_names
+                               if name.startswith(("bars.", "passive."))):
+        lines += ["", f"[{table}]", *_bearing_lines(rods, f"{table}.")]
     return lines
+
+
+def _bearing_lines(rods: RodErrors, table: str) -> list[str]:
+    """The keys of a table, whose parameters begin with `table`."""
+    found: dict[str, list[float]] = {}
+    for name, value in zip(rods.bearing_names, rods.bearings, strict=True):
+        if name.startswith(table):
+            unit = UNITS[ANGLE if angular(name) else LENGTH]
+            found.setdefault(name.removeprefix(table).split(".")[0], []).append(value / unit)
+    return [f"{key} = {_list(values) if len(values) > 1 else _number(values[0])}" for key, values in found.items()]
 
 
 def _list(values: Floats | Sequence[float]) -> str:

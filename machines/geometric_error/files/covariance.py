@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from machines.geometric_error.actual.bearings import ANGLES
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.rods import RodErrors
 from machines.geometric_error.files.file_models import ErrorFileModel
@@ -29,7 +30,7 @@ def angular(name: str, rods: RodErrors | None = None) -> bool:
     """True for parameters in rad, of a machine with these rods."""
     part = name.split(".")[-2] if name.count(".") > 1 else ""
     if part:
-        return part == "guide"
+        return part in ANGLES or name.endswith(".square")
     if name.endswith(".drive"):
         return rods is not None and name.split(".")[0] in rods.arms
     if "]." in name:

@@ -92,6 +92,34 @@ class LegErrorModel(UserModel):
     """per rod"""
     drive: float = 0.0
     """kind "legs": by how much the drive stands farther than it counts; of an arm an angle"""
+    hinge_turn: Vector = (0.0, 0.0, 0.0)
+    """of a leg on a hinge: turns of the hinge about x, y, z of the machine frame, on the guide as that is turned"""
+    ring: float = 0.0
+    """of a leg that ends on a ring: its radius"""
+
+
+class BarErrorModel(UserModel):
+    """`[bars.NAME]` of a platform with hinged bars."""
+
+    hinge: Vector = (0.0, 0.0, 0.0)
+    """place of the hinge on the platform"""
+    hinge_turn: Vector = (0.0, 0.0, 0.0)
+    """turns of its line about x, y, z of the platform"""
+
+
+class PassiveErrorModel(UserModel):
+    """`[passive.NAME]` of a platform with a leg that has no drive."""
+
+    point: Vector = (0.0, 0.0, 0.0)
+    """place of the universal joint in the machine frame"""
+    hinge_turn: Vector = (0.0, 0.0, 0.0)
+    """turns of the joint's outer axis about x, y, z of the machine frame"""
+    joint: Vector = (0.0, 0.0, 0.0)
+    """place of the leg's line on the platform"""
+    line_turn: Vector = (0.0, 0.0, 0.0)
+    """turns of the line, and of the joint's inner axis with it, about x, y, z of the platform"""
+    square: float = 0.0
+    """angle by which the joint's axes are off a right angle"""
 
 
 class MapModel(UserModel):
@@ -145,6 +173,10 @@ class ErrorFileModel(UserModel):
     """by axis letter"""
     legs: dict[str, LegErrorModel] = Field(default_factory=dict)
     """parallel machines, by axis letter"""
+    bars: dict[str, BarErrorModel] = Field(default_factory=dict)
+    """by the names of the machine file"""
+    passive: dict[str, PassiveErrorModel] = Field(default_factory=dict)
+    """by the names of the machine file"""
     map: MapModel | None = None
     """instead of all others"""
     sigma: dict[str, Annotated[float, Field(ge=0)]] = Field(default_factory=dict)
@@ -154,8 +186,8 @@ class ErrorFileModel(UserModel):
 
     @model_validator(mode="after")
     def _fits(self) -> ErrorFileModel:
-        if self.map is not None and (self.components or self.location or self.legs):
-            raise ValueError("[map] stands alone; take out components, location and legs")
+        if self.map is not None and (self.components or self.location or self.legs or self.bars or self.passive):
+            raise ValueError("[map] stands alone; take out components, location, legs, bars and passive")
         if self.sigma and self.covariance is not None:
             raise ValueError("give [sigma] or [covariance], not both")
         for name in self.components:

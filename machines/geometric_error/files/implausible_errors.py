@@ -46,12 +46,18 @@ class TooLarge:
         return f"{size / DEG:.4g} degrees" if self.turn else f"{size:.4g} mm"
 
 
+def _table(name: str) -> tuple[str, str]:
+    """The table of a dimension."""
+    first, second = name.split(".")[:2]
+    return (first, second) if first in ("bars", "passive") else ("legs", first.rstrip("12"))
+
+
 def too_large(model: ErrorModel) -> list[TooLarge]:
     """The errors of a model above 1 mm or 0.5 degrees."""
     found = [TooLarge(("components", str(c.name)), largest(c.curve), c.name.angular) for c in model.axes.components]
     found += [TooLarge(("location", name), abs(value), angular(name)) for name, value in model.axes.constants.items()]
     if model.rods is not None:
-        found += [TooLarge(("legs", name.split(".")[0].rstrip("12"), name), abs(value), angular(name, model.rods))
+        found += [TooLarge((*_table(name), name), abs(value), angular(name, model.rods))
                   for name, value in zip(model.rods.names, model.rods.values.tolist(), strict=True)]
     if model.map is not None:
         found += [TooLarge(("map", "table", name), float(np.abs(model.map.table[..., k]).max()), k >= 3)

@@ -14,7 +14,7 @@ from machines.geometric_error.actual.leg_frame import LegFrame, frame_of
 from machines.geometric_error.actual.model import ErrorModel
 from machines.geometric_error.actual.rods import RodErrors, gives_rods, rod_frame, rod_names
 from machines.geometric_error.actual.serial_errors import Component, ErrorFrame, SerialErrors
-from machines.geometric_error.files.covariance import covariance_of
+from machines.geometric_error.files.covariance import angular, covariance_of
 from machines.geometric_error.files.file_models import CurveModel, ErrorFileModel, LegErrorModel
 from machines.geometric_error.files.implausible_errors import too_large
 from machines.geometric_error.tables.csv_table import UNITS, CsvTable, read_csv
@@ -32,6 +32,8 @@ from toolpaths.diagnostics import Diagnostic, Severity, has_errors, read_value, 
 from toolpaths.units import DEG
 
 KIND = "error model"
+BEARINGS = frozenset(("hinge", "hinge_turn", "ring", "point", "joint", "line_turn", "square"))
+"""keys of what holds a platform besides its rods"""
 DIMENSIONS = ("rail", "guide", "carriage", "platform", "length")
 """of legs and rods, in the order of their parameters"""
 
@@ -216,6 +218,10 @@ class _Loader:
         kinematics, own = self.machine.kinematics.on_rods, frame_of(self.machine.kinematics)
         if own is not None:
             return self._legs(own)
+        for table in ("bars", "passive"):
+            for name in getattr(self.checked, table):
+                self._problem("error-model.legs", (table, name), f"{self.machine.name} has no {table} that could be off",
+                              f"take [{table}] out")
         if kinematics is None:
             for letter in self.checked.legs:
                 self._problem("error-model.legs", ("legs", letter), f"{self.machine.name} has no legs",
@@ -264,7 +270,28 @@ class _Loader:
             if drives.stretch[k] and any(given.guide):
                 self._problem("error-model.legs", ("legs", letter, "guide"), f"leg {letter} changes its length: it has no "
                               "guide to be turned", "take guide out; its foot is moved by rail")
-        return replace(zero, **parts)
+        return replace(zero, **parts, bearings=self._bearings(zero))
+
+    def _bearings(self, zero: RodErrors) -> Floats:
+        """Of the hinges of bars and legs, rings and passive legs, in the order of `zero.bearing_names`."""
+        found = np.zeros(len(zero.bearing_names))
+        for table, prefix in (("legs", ""), ("bars", "bars."), ("passive", "passive.")):
+            for name, given in getattr(self.checked, table).items():
+                for key in BEARINGS & given.model_fields_set:
+                    mine = [k for k, one in enumerate(zero.bearing_names)
+                            if f"{prefix}{name}.{key}" in (one, one.rpartition(".")[0])]
+                    value = np.atleast_1d(getattr(given, key))
+                    if mine:
+                        found[mine] = value * (self.angle if angular(zero.bearing_names[mine[0]]) else self.length)
+                    elif value.any():
+                        self._no_bearing((table, name, key), zero.bearing_names)
+        return found
+
+    def _no_bearing(self, path: tuple[str, str, str], names: tuple[str, ...]) -> None:
+        """An error of a hinge, ring or passive leg that the machine has not."""
+        known = list(dict.fromkeys(name.rpartition(".")[0] if name[-2:] in (".x", ".y", ".z") else name for name in names))
+        self._problem("error-model.legs", path, f"{self.machine.name} has no {path[2]} of {path[1]!r} that could be off",
+                      f"it has {', '.join(known)}" if known else f"take {path[2]} out")
 
     def _dimensions(self, parts: dict[str, Floats], legs: tuple[str, ...], leg_of: Ints) -> None:
         """The `[legs]` tables into arrays by DIMENSIONS, of rods by their legs (R,)."""

@@ -46,6 +46,8 @@ class Loops:
         rings: (K,) mm, radii about z of the platform, round its joints, on which legs of changing length end; 0 of others;
             None without any
         bars: the number of the bar that each leg holds, -1 of none; () without bars
+        bar_names, passive: names of bars and of passive legs
+        hinged: legs that swing about hinges; in `holds` they stand behind the passive legs
     """
 
     drives: Drives
@@ -56,6 +58,9 @@ class Loops:
     free: tuple[str, ...] = ()
     rings: Floats | None = None
     bars: tuple[int, ...] = ()
+    bar_names: tuple[str, ...] = ()
+    passive: tuple[str, ...] = ()
+    hinged: tuple[int, ...] = ()
 
     @cached_property
     def basis(self) -> Floats:
@@ -85,13 +90,13 @@ class Loops:
 
     def ends(self, place: Floats, turn: Floats) -> Floats:
         """B (N, K, 3) mm."""
-        return self._ends(place, self._arms(place, turn))
+        return self._ends(place, self.arms_at(place, turn))
 
     def _ends(self, place: Floats, arms: Floats) -> Floats:
         ends = place[:, None, :] + arms
         return np.asarray(ends if self.kept is None else ends + self.kept, dtype=np.float64)
 
-    def _arms(self, place: Floats, turn: Floats) -> Floats:
+    def arms_at(self, place: Floats, turn: Floats) -> Floats:
         """`arms`, of legs on rings to the point of the ring that is nearest to the foot."""
         arms = self.arms(turn)
         if self.rings is None:
@@ -124,6 +129,12 @@ class Loops:
             return right
         return np.hstack([right, np.zeros((len(right), self.holds.count)) if held is None else self.weight * held])
 
+    def held_gaps(self, place: Floats, turn: Floats, q: Floats) -> Floats:
+        """(N, H) mm that what holds the platform misses, of joints q (N, K) of the drives."""
+        assert self.holds is not None
+        gaps = self.holds.gaps(place, turn)
+        return gaps if (self.holds.foot < 0).all() else gaps - self.holds.at_feet(self.drives.feet(q))
+
     def of_drives(self, jx: Floats) -> Floats:
         """(N, K, K): Jx (N, 6, 6) of the freedoms that the drives set, with what follows as it follows; of others itself."""
         if self.holds is None:
@@ -140,7 +151,7 @@ class Loops:
 
     def matrix_at(self, place: Floats, turn: Floats, q: Floats) -> tuple[Floats, Floats]:
         """(Jx (N, K, K), rods (N, K, 3)) mm, of joints q (N, K) of the drives; see `matrix`."""
-        arms = self._arms(place, turn)
+        arms = self.arms_at(place, turn)
         rods = self._ends(place, arms) - self.drives.feet(q)
         return self.matrix(rods, arms, (place, turn)), np.asarray(rods, dtype=np.float64)
 
@@ -170,7 +181,7 @@ class Loops:
             square = self.drives.spans(q[live]) ** 2
             gap = 0.5 * (dot(rods, rods) - square)
             if self.holds is not None:
-                gap = self.driven(gap, self.holds.gaps(place[live], turn[live]))
+                gap = self.driven(gap, self.held_gaps(place[live], turn[live], q[live]))
                 square = self.sizes(q[live]) ** 2
             step = self.twists(solved(jx, -gap))
             place[live] += step[:, :3]

@@ -11,9 +11,11 @@ from postproc.feedrate.feed import StepFeed
 from postproc.orientation.passes.contact import Contact
 from postproc.orientation.passes.passes import Pass, PassContext
 from postproc.orientation.passes.poses import poses
+from postproc.orientation.turning.kept_contact import corner_centre, kept_tip
 from postproc.orientation.turning.run_contact import contact_along
 from postproc.planning.geometry_sites import sites
 from postproc.planning.pass_geometry import stops_of
+from postproc.reference.cutter import CutterEnd, cutter_end
 from postproc.reference.events import compensation_states
 from postproc.setup.orientation import OrientationLimits
 from toolpaths.arrays import Bools, Floats, Ints
@@ -22,10 +24,15 @@ from toolpaths.rotations import angle_between
 from toolpaths.shapes import arrays
 from toolpaths.smoothing.smooth import Smooth, Tolerance, smooth_all
 from toolpaths.toolpath import Kind, Role
+from toolpaths.units import DEG
 
 TURNS = 1e-6
 """rad: axes that differ by less are one"""
 UNKNOWN_SURFACE = "lead, tilt and distance from the centre need surface normals, and none is known"
+LEAN = (1.0 * DEG, 85.0 * DEG)
+"""rad between axis and normal within which a corner touches the surface at one point, with a margin"""
+PLANE = 1e-4, 1e-3
+"""rad between normals, mm between contacts across: within both a cut is on a plane"""
 PLAIN = 40
 """G40: no compensation of the radius"""
 
@@ -44,7 +51,7 @@ class TurningStretch:
 
 
 @dataclass(frozen=True)
-@arrays(s="N", tip="N 3", axis="N 3", line="N")
+@arrays(s="N", tip="N 3", axis="N 3", line="N", normal="N 3")
 class CuttingRun:
     """Cuts between two rapids, the pose they begin at with them, in the table frame.
 
@@ -57,6 +64,8 @@ class CuttingRun:
         whole: the pass that it belongs to
         cone: rad by which an axis may be turned
         limits: of the operation
+        end: of the cutter
+        normal (N, 3): of the surface at the poses, where the cutter is no ball
         fixed: why its axes stay, "" where they may be turned
         contact: where the surface is known, `line` the number of the pose; looked at where the axes may turn
         stretches: between stops; none where `fixed`
@@ -71,7 +80,9 @@ class CuttingRun:
     whole: Pass
     cone: float
     limits: OrientationLimits
-    fixed: str
+    end: CutterEnd
+    normal: Floats
+    fixed: str = ""
     contact: Contact = field(default_factory=Contact.none)
     stretches: tuple[TurningStretch, ...] = ()
 
@@ -79,6 +90,17 @@ class CuttingRun:
     def length(self) -> float:
         """mm along the run, turns of the axis with it"""
         return float(self.s[-1])
+
+    def normal_at(self, s: Floats) -> Floats:
+        """(M, 3) normals of the surface at s (M,), turned evenly from pose to pose; 0 of a ball, which needs none."""
+        if self.end.flat == 0.0:
+            return np.zeros((len(s), 3))
+        found = np.stack([np.interp(s, self.s, column) for column in self.normal.T], axis=1)
+        return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+
+    def kept(self, tip: Floats, axis: Floats, turned: Floats, normal: Floats) -> Floats:
+        """(M, 3) tips along axes `turned` (M, 3) that touch where `tip`, `axis` (M, 3) do."""
+        return kept_tip(tip, axis, turned, self.end, normal)
 
     @property
     def turns(self) -> float:
@@ -96,9 +118,12 @@ def runs_of(work: PassContext, tolerance: Tolerance, most: float) -> list[Cuttin
         whole = work.passes[int(np.searchsorted(first, low, side="right")) - 1]
         limits = work.setup.orientation.of(_operation(work, low))
         cone = min(np.radians(limits.cone or 0.0), most)
+        tool = work.toolpath.tools[whole.tool] if whole.tool >= 0 else None
+        end, normal = cutter_end(tool), _normals(work, low, high)
         run = CuttingRun(number, (low, high), np.zeros(high - low + 1), work.moves.tip[low - 1:high],
-                         work.moves.axis[low - 1:high], work.moves.line[low - 1:high], whole, cone, limits, "")
-        if not (why := _fixed(work, run)):
+                         work.moves.axis[low - 1:high], work.moves.line[low - 1:high], whole, cone, limits,
+                         end or CutterEnd(0.0, 0.0), normal)
+        if not (why := _fixed(work, run) or _by_cutter(work, run, end)):
             run = replace(run, contact=_contact(work, run))
             why = UNKNOWN_SURFACE if limits.need_normals and not len(run.contact) else ""
         result.append(replace(run, fixed=why) if why else _with_stretches(work, run, stops, tolerance))
@@ -106,8 +131,15 @@ def runs_of(work: PassContext, tolerance: Tolerance, most: float) -> list[Cuttin
 
 
 def _contact(work: PassContext, run: CuttingRun) -> Contact:
-    radius, rows = run.whole.radius, work.moves.row[run.rows[0] - 1:run.rows[1]]
-    return contact_along(work, rows, run.tip + radius * run.axis, radius)
+    rows = work.moves.row[run.rows[0] - 1:run.rows[1]]
+    return contact_along(work, rows, run.tip + corner_centre(run.axis, run.end, run.normal), run.whole.radius)
+
+
+def _normals(work: PassContext, low: int, high: int) -> Floats:
+    """(N, 3) normals that the file states at the pose before rows [low, high) of Moves and at their ends, else NaN."""
+    if work.toolpath.normal is None:
+        return np.full((high - low + 1, 3), np.nan)
+    return work.placement.directions(work.toolpath.normal[work.moves.row[low - 1:high]])
 
 
 def _rows(work: PassContext) -> list[tuple[int, int]]:
@@ -129,8 +161,6 @@ def _fixed(work: PassContext, run: CuttingRun) -> str:
     here, rows = slice(low, high), work.moves.row[low:high]
     if run.cone <= 0.0:
         return "[orientation] of the set-up states no cone for it"
-    if run.whole.radius <= 0.0:
-        return "the cutter is not a ball: turned, it would touch elsewhere"
     if _operation(work, low) in work.setup.orientation.fixed_operations:
         return f"the set-up keeps the axis of operation {_operation(work, low)!r}"
     if bool((moves.arc[here] >= 0).any()):
@@ -146,6 +176,33 @@ def _fixed(work: PassContext, run: CuttingRun) -> str:
     if bool((compensation_states(work.toolpath)[rows] != PLAIN).any()):
         return "the control compensates the radius of the cutter there"
     return "packages limit its axis (criteria)" if run.limits.criteria else ""
+
+
+def _by_cutter(work: PassContext, run: CuttingRun, end: CutterEnd | None) -> str:
+    """Why its cutter holds the axes of a run: turned, it would touch elsewhere, or cut what nobody compares; "" if not.
+
+    Cutters that touch a plane touch it along every axis between `LEAN`. On a curved surface what is next to the
+    contact may reach into a toroid that leans otherwise: the program's proof looks for that where the part is stated.
+    """
+    if end is None:
+        return "the cutter is not known to end in a ball, or in a corner round a flat: turned, it would touch elsewhere"
+    if end.flat == 0.0:
+        return "" if run.whole.radius > 0.0 else "the cutter has no size"
+    if not np.isfinite(run.normal).all():
+        return "the cutter is not a ball: turned, it keeps its contact only where the file states surface normals"
+    lean = angle_between(run.axis, run.normal)
+    if lean.min() < LEAN[0] or lean.max() > LEAN[1]:
+        return "the cutter is not a ball, and stands square to the surface or along it: it does not touch at one point"
+    contact = run.tip + corner_centre(run.axis, end, run.normal) - end.corner * run.normal
+    across = np.abs((contact - contact[0]) @ run.normal[0])
+    if float(angle_between(run.normal, run.normal[:1]).max()) <= PLANE[0] and float(across.max()) <= PLANE[1]:
+        return ""
+    if end.corner == 0.0:
+        return "a flat end keeps its contact on planes alone"
+    bodies = work.setup.bodies
+    return "" if bodies is not None and bodies.part is not None else (
+        "a toroid on a curved surface is turned only where the part is stated, with which its program is compared: "
+        "[bodies] part")
 
 
 def _with_stretches(work: PassContext, run: CuttingRun, stops: Ints, tolerance: Tolerance) -> CuttingRun:

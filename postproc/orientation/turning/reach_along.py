@@ -18,8 +18,8 @@ from postproc.feedrate.limits import JointLimits
 from postproc.feedrate.plan import plan
 from postproc.joints.joint_path import nearest_solution
 from postproc.orientation.turning.cutting_runs import TurningStretch
+from postproc.orientation.turning.kept_contact import corner_centre
 from postproc.orientation.turning.tilt_search import TiltField
-from postproc.orientation.turning.tilted_axes import kept_ball
 from postproc.planning.geometry import MachinePath
 from toolpaths.arrays import Floats
 from toolpaths.dataclass import dataclass
@@ -50,15 +50,16 @@ def reach_along(stretch: TurningStretch, made: TiltField, limits: JointLimits) -
     """The reach along a stretch with the axes of a field; `limits` of the machine at feed, jerk finite."""
     limits = replace(limits, forces=None, tool=None)
     axis = made.turned(stretch.axis, made.at(stretch.s))
-    radius, kin = made.run.whole.radius, made.run.whole.kin
-    tip = kept_ball(stretch.tip, stretch.axis, axis, radius)
+    kin, normal = made.run.whole.kin, made.run.normal_at(stretch.s)
+    tip = made.run.kept(stretch.tip, stretch.axis, axis, normal)
     q = nearest_solution(kin, tip, axis, stretch.q) if made.field.any() else stretch.q
     path = MachinePath.through(stretch.s, np.hstack((q, tip, axis)), np.zeros(len(q), dtype=bool))
     motion = plan(path, limits, stretch.feed)
     s = np.linspace(stretch.s[0], stretch.s[-1], PLACES + 2)[1:-1]
     at, speed = path.derivatives(s), motion.speed(s)
     change = 0.5 * np.gradient(speed**2, s)
-    centre = np.stack([np.interp(s, stretch.s, column) for column in (stretch.tip + radius * stretch.axis).T], axis=1)
+    corner = stretch.tip + corner_centre(stretch.axis, made.run.end, normal)
+    centre = np.stack([np.interp(s, stretch.s, column) for column in corner.T], axis=1)
     scale = np.linalg.norm(np.gradient(centre, s, axis=0), axis=1)
     v = speed[:, None]
     with np.errstate(divide="ignore"):

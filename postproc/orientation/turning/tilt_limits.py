@@ -1,4 +1,4 @@
-"""What holds the axes of a run: cone, lead and tilt, dead centre, travel, and how far the ball may leave its path.
+"""What holds the axes of a run: cone, lead and tilt, dead centre, travel, and how far ball or corner may leave its path.
 
 Each limit is a number that must not be above 0 at a row or a site, relaxed to what the CL file's own axis makes of it: an
 axis that is outside already is turned no farther out. The search sees each as a penalty, whose slope it needs.
@@ -11,34 +11,38 @@ import numpy as np
 from machines.machine import Machine
 from postproc.orientation.passes.allowed import off_centre
 from postproc.orientation.passes.contact import Contact
-from postproc.orientation.turning.cutting_runs import CuttingRun
-from postproc.orientation.turning.tilted_axes import sagitta
+from postproc.orientation.turning.cutting_runs import LEAN, CuttingRun
+from postproc.orientation.turning.kept_contact import bend, bend_slopes
+from postproc.reference.cutter import CutterEnd
 from toolpaths.arrays import Floats, Ints
 from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
 SHARE = 0.1
-"""of the tolerance by which the ball's centre may leave its path between two points of the CL file"""
+"""of the tolerance by which the centre of ball or corner may leave its path between two points of the CL file"""
 WEIGHT = 100.0
 """of a penalty, per rad^2 or (10 mm)^2 over a limit, next to the time over that of the own axes"""
 MARGIN = 2e-3
 """rad or 10 mm inside a limit where its penalty begins"""
 NEAR = 0.9
 """of the share of the tolerance, likewise"""
+NUDGE = 1e-6
+"""rad, by which the bend of the path is differenced"""
 _SLACK = 1e-9
 
 
 @dataclass(frozen=True)
-@arrays(row="K", side="K 3", most="K", lower="J", upper="J", scale="J", own="m 3")
+@arrays(row="K", side="K 3", most="K", lower="J", upper="J", scale="J", own="m 3", normal="N 3")
 class TiltLimits:
     """Limits of one run of N poses.
 
     Attributes:
         row (K,): pose that a half-space is for; side (K, 3), most (K,): its axis a must have a . side <= most
         lower, upper (J,): travel; scale (J,): 1 for rotary joints, 0.1 for slides
-        own (N - 1, 3): sagitta of the own axes, as `tilted_axes.sagitta`
-        radius, slack: of the ball, and by how much its centre may leave its path, mm
+        own (N - 1, 3): `bend` of the own axes, mm
+        slack: mm by which the centre of ball or corner may leave its path
+        end, normal (N, 3): of the cutter, and of the surface where that matters
     """
 
     row: Ints
@@ -48,8 +52,9 @@ class TiltLimits:
     upper: Floats
     scale: Floats
     own: Floats
-    radius: float
     slack: float
+    end: CutterEnd
+    normal: Floats
 
     def broken(self, axis: Floats, q: Floats) -> bool:
         """Whether axes (N, 3) at the poses or joints (M, J) at the sites are outside."""
@@ -59,23 +64,22 @@ class TiltLimits:
                     or self.off_path(axis) > self.slack)
 
     def off_path(self, axis: Floats) -> float:
-        """mm that the ball's centre leaves its path between the poses at most, with axes (N, 3)."""
-        return self.radius * float(np.linalg.norm(sagitta(axis) - self.own, axis=1).max(initial=0.0))
+        """mm that the centre of ball or corner leaves its path between the poses at most, with axes (N, 3)."""
+        return float(np.linalg.norm(bend(axis, self.end, self.normal) - self.own, axis=1).max(initial=0.0))
 
     def penalty_of_axes(self, axis: Floats) -> tuple[float, Floats]:
         """Penalty of axes (N, 3) at the poses, and its slope by them (N, 3)."""
         over = np.maximum(np.einsum("ki,ki->k", axis[self.row], self.side) - self.most + MARGIN, 0.0)
         slope = np.zeros_like(axis)
         np.add.at(slope, self.row, 2.0 * WEIGHT * over[:, None] * self.side)
-        both = axis[:-1] + axis[1:]
-        size = np.linalg.norm(both, axis=1, keepdims=True)
-        off = (sagitta(axis) - self.own) * (self.radius / self.slack)
+        off = (bend(axis, self.end, self.normal) - self.own) / self.slack
         far = np.linalg.norm(off, axis=1, keepdims=True)
         much = np.maximum(far - NEAR, 0.0)
-        push = 2.0 * much * off / np.maximum(far, 1e-12) * (self.radius / self.slack)
-        inward = push * (1.0 / size - 0.5) - both * np.einsum("ni,ni->n", both, push)[:, None] / size**3
-        slope[:-1] += inward
-        slope[1:] += inward
+        if much.any():
+            push = 2.0 * much * off / np.maximum(far, 1e-12) / self.slack
+            before, behind = bend_slopes(axis, self.end, self.normal, NUDGE)
+            slope[:-1] += np.einsum("nik,ni->nk", before, push)
+            slope[1:] += np.einsum("nik,ni->nk", behind, push)
         return float(WEIGHT * (over**2).sum() + (much**2).sum()), slope
 
     def penalty_of_joints(self, q: Floats) -> tuple[float, Floats]:
@@ -93,8 +97,8 @@ def limits_of(run: CuttingRun, machine: Machine, tolerance: float, most: float) 
     q = np.concatenate([one.q for one in run.stretches])
     limits = machine.limits
     return TiltLimits(row, side, np.maximum(bound, inside), np.minimum(limits.lower, q.min(axis=0)),
-                      np.maximum(limits.upper, q.max(axis=0)), np.where(machine.rotary, 1.0, 0.1), sagitta(run.axis),
-                      run.whole.radius, SHARE * tolerance)
+                      np.maximum(limits.upper, q.max(axis=0)), np.where(machine.rotary, 1.0, 0.1),
+                      bend(run.axis, run.end, run.normal), SHARE * tolerance, run.end, run.normal)
 
 
 def _half_spaces(run: CuttingRun, at: Contact, most: float) -> tuple[Ints, Floats, Floats]:
@@ -103,8 +107,11 @@ def _half_spaces(run: CuttingRun, at: Contact, most: float) -> tuple[Ints, Float
     An angle atan2(a . u, a . n) is at most h where a . (u cos h - n sin h) <= 0, for limits within +-90 degrees.
     """
     limits, parts = run.limits, list[tuple[Floats, float]]()
+    least = off_centre(limits, run.end.corner)
+    if run.end.flat:
+        least, most = max((limits.off_centre or 0.0) * DEG, LEAN[0]), min(most, LEAN[1])
     parts.append((-at.normal, -float(np.cos(most))))
-    if (least := off_centre(limits, run.whole.radius)) > 0.0:
+    if least > 0.0:
         parts.append((at.normal, float(np.cos(least))))
     for given, side in ((limits.lead, at.travel), (limits.tilt, at.right)):
         for angle, sign in ((given[0] * DEG, -1.0), (given[1] * DEG, 1.0)) if given is not None else ():

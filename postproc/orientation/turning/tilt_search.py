@@ -21,7 +21,7 @@ from postproc.orientation.turning.block_time import block_time
 from postproc.orientation.turning.cutting_runs import CuttingRun
 from postproc.orientation.turning.planned_time import PlannedTime
 from postproc.orientation.turning.tilt_limits import TiltLimits
-from postproc.orientation.turning.tilted_axes import TiltBasis, kept_ball, turned_axes
+from postproc.orientation.turning.tilted_axes import TiltBasis, turned_axes
 from toolpaths.arrays import Floats
 from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
@@ -45,12 +45,13 @@ _OUT = 10.0
 
 
 class CutPoses(NamedTuple):
-    """CutPoses (N, 3), (N, 3) of the own axes, their joints (N, J), and the basis of the field there (N, C)."""
+    """Tips and own axes (N, 3), their joints (N, J), the basis of the field there (N, C), normals of the surface (N, 3)."""
 
     tip: Floats
     axis: Floats
     q: Floats
     basis: csr_matrix
+    normal: Floats
 
 
 class TurnedPoses(NamedTuple):
@@ -93,7 +94,8 @@ class TiltSearch:
         self.basis = TiltBasis.over(run.length, float(np.clip(run.length / PARTS, FINEST, COARSEST)))
         self._kin: Kinematics = run.whole.kin
         at = [self.basis.at(one.s) for one in run.stretches]
-        self._sites = [CutPoses(one.tip, one.axis, one.q, b) for one, b in zip(run.stretches, at, strict=True)]
+        self._sites = [CutPoses(one.tip, one.axis, one.q, b, run.normal_at(one.s))
+                       for one, b in zip(run.stretches, at, strict=True)]
 
     @cached_property
     def _rows(self) -> CutPoses:
@@ -102,7 +104,8 @@ class TiltSearch:
         s, q = (np.concatenate([getattr(one, name) for one in run.stretches]) for name in ("s", "q"))
         near = np.stack([np.interp(run.s, s, column) for column in q.T], axis=1)
         axis = self._kin.nearest_axis(run.axis)
-        return CutPoses(run.tip, axis, nearest_solution(self._kin, run.tip, axis, near), self.basis.at(run.s))
+        return CutPoses(run.tip, axis, nearest_solution(self._kin, run.tip, axis, near), self.basis.at(run.s),
+                        run.normal_at(run.s))
 
     @cached_property
     def _fed(self) -> Floats:
@@ -201,7 +204,7 @@ class TiltSearch:
 
     def _posed(self, at: CutPoses, field: Floats) -> TurnedPoses:
         axis = self._posed_axes(at, field)
-        tip = kept_ball(at.tip, at.axis, axis, self.run.whole.radius)
+        tip = self.run.kept(at.tip, at.axis, axis, at.normal)
         return TurnedPoses(axis, nearest_solution(self._kin, tip, axis, at.q))
 
     def _by_field(self, at: CutPoses, field: Floats, here: TurnedPoses, slope: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Tool axes turned by a smooth field along a cut, the ball's centre kept.
+"""Tool axes turned by a smooth field along a cut.
 
 The field d(s) (3,) is a cubic B-spline in the table frame. What lies along the axis a of the CL file turns nothing: the axis
 is turned by the angle |t| towards t = d - (d.a) a, so that no place is turned by more than |d|, and |d| is nowhere more than
@@ -56,17 +56,3 @@ def turned_axes(axis: Floats, field: Floats) -> Floats:
     angle = np.linalg.norm(across, axis=1)[:, None]
     turned = np.cos(angle) * axis + np.sinc(angle / np.pi) * across
     return np.where(angle > _SMALL, turned / np.linalg.norm(turned, axis=1, keepdims=True), axis)
-
-
-def kept_ball(tip: Floats, axis: Floats, turned: Floats, radius: float) -> Floats:
-    """(N, 3) tips along axes `turned` (N, 3) whose ball of `radius` has its centre where it is at `tip`, `axis` (N, 3)."""
-    return np.asarray(tip + radius * (axis - turned))
-
-
-def sagitta(axis: Floats) -> Floats:
-    """(N - 1, 3) by which the middle of each turn between two of N unit axes (N, 3) lies off the chord between them.
-
-    The tip goes straight while the axis turns evenly: a ball's centre bends off its straight path by its radius times this.
-    """
-    both = axis[:-1] + axis[1:]
-    return np.asarray(both * (1.0 / np.linalg.norm(both, axis=1, keepdims=True) - 0.5))

@@ -1,4 +1,4 @@
-"""The CL path with the axes of runs turned: balls where they were, every cut in the time that it had."""
+"""The CL path with the axes of runs turned: contacts where they were, every cut in the time that it had."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import numpy as np
 from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.turning.cutting_runs import TURNS
 from postproc.orientation.turning.tilt_search import TiltField
-from postproc.orientation.turning.tilted_axes import kept_ball
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.rotations import angle_between
 from toolpaths.toolpath import FeedMode, Kind, Role, Toolpath
@@ -31,16 +30,15 @@ def turned_toolpath(work: PassContext, fields: Sequence[TiltField]) -> Toolpath:
     for one in fields:
         low, high = one.run.rows
         own = moves.row[low - 1:high]
-        places = [(own, one.axes), *_rapids(work, one)]
-        for rows, axes in places:
-            before = path.axis[rows]
+        places = [(own, one.axes, one.run.normal), *_rapids(work, one)]
+        for rows, axes, normal in places:
             axis[rows] = back.directions(axes)
-            tip[rows] = kept_ball(path.tip[rows], before, axis[rows], one.run.whole.radius)
+            tip[rows] = one.run.kept(path.tip[rows], path.axis[rows], axis[rows], back.directions(normal))
     return replace(path, tip=tip, axis=axis, feed=_in_their_time(path, tip, axis))
 
 
-def _rapids(work: PassContext, made: TiltField) -> list[tuple[Ints, Floats]]:
-    """Rows of the Toolpath of rapids next to a run that stand along its first axis, or its last, and their axes (N, 3):
+def _rapids(work: PassContext, made: TiltField) -> list[tuple[Ints, Floats, Floats]]:
+    """Rows of the Toolpath of rapids next to a run that stand along its first axis, or its last; axes, normals (N, 3):
     those that lead to it, but the one that draws back from the cut before, and the one that draws back from it. They are
     of its own operation and tool: others keep their axes, and a ball of another radius is elsewhere."""
     moves, (low, high), run = work.moves, made.run.rows, made.run
@@ -53,8 +51,9 @@ def _rapids(work: PassContext, made: TiltField) -> list[tuple[Ints, Floats]]:
     ends, axes = high, made.axes
     if high < len(moves) and _stands(work, free & own, high, run.axis[-1]) and (high + 1 == len(moves) or free[high + 1]):
         ends = high + 1
-    parts = ((np.arange(first, low - 1), axes[0]), (np.arange(high, ends), axes[-1]))
-    return [(moves.row[rows], np.tile(one, (len(rows), 1))) for rows, one in parts if len(rows)]
+    parts = ((np.arange(first, low - 1), axes[0], run.normal[0]), (np.arange(high, ends), axes[-1], run.normal[-1]))
+    return [(moves.row[rows], np.tile(one, (len(rows), 1)), np.tile(normal, (len(rows), 1)))
+            for rows, one, normal in parts if len(rows)]
 
 
 def _stands(work: PassContext, free: Bools, row: int, axis: Floats) -> bool:

@@ -21,7 +21,7 @@ from toolpaths.units import DEG
 SHOWN = 20
 """cuts in the table; where there are more, those that gain most"""
 _LINES = 6
-_HEADS = ("cut", "lines", "turned by deg", "of deg", "lead deg", "tilt deg", "ball off path mm", "on control s",
+_HEADS = ("cut", "lines", "turned by deg", "of deg", "lead deg", "tilt deg", "off path mm", "on control s",
           "own axes s", "gain %", "planned s", "own axes s")
 
 
@@ -64,7 +64,7 @@ def as_dict(choice: TurningChoice) -> dict[str, Any]:
 def as_text(choice: TurningChoice) -> str:
     """Table of the cuts whose axes turn, why others keep theirs, and the times on the control."""
     turned, best = sorted((one for one in choice.runs if one.turned), key=_saved, reverse=True), most_gaining(choice)
-    lines = [f"axes turned along {len(turned)} of {len(choice.runs)} cuts, the ball's centre kept"]
+    lines = [f"axes turned along {len(turned)} of {len(choice.runs)} cuts, their contact kept"]
     rows = [_row(one) for one in sorted(turned[:SHOWN], key=lambda one: one.run.number)]
     lines += table_text(rows, _HEADS, "rlrrllrrrrrr") if rows else []
     if len(turned) > SHOWN:
@@ -91,7 +91,7 @@ def header(choice: TurningChoice) -> list[str]:
         return []
     most, off = max(_turned(one).max() for one in turned), max(_off_path(one) for one in turned)
     return [f"tool axes turned along {len(turned)} of {len(choice.runs)} cuts, by up to {most / DEG:.2f} degrees; "
-            "the ball's centre as in the CL file at its points",
+            "its contact as in the CL file at its points",
             f"and within {off:.5f} mm of its path between them; every cut in the time that the file gives it"]
 
 
@@ -170,7 +170,8 @@ def _reach_lines(choice: TurningChoice, one: RunChoice) -> list[str]:
              f"velocity {_middle(own.velocity):.0f}, {_middle(now.velocity):.0f} mm/s",
              f"acceleration {_middle(own.acceleration):.0f}, {_middle(now.acceleration):.0f} mm/s2",
              f"jerk {_middle(own.jerk):.0f}, {_middle(now.jerk):.0f} mm/s3"]
-    return [f"cut {one.run.number}, along the path of the ball's centre, own axes and turned, medians: {'; '.join(parts)}"]
+    return [f"cut {one.run.number}, along the path of the centre of ball or corner, own axes and turned, medians: "
+            f"{'; '.join(parts)}"]
 
 
 def _middle(values: Floats) -> float:
@@ -187,7 +188,7 @@ def _cut(one: RunChoice) -> dict[str, Any]:
     found = _ranges(one)
     return values | {"turned_deg": float(_turned(one).max()) / DEG, "cone_deg": run.cone / DEG,
                      "lead_deg": list(found["lead"]) if found else None, "tilt_deg": list(found["tilt"]) if found else None,
-                     "ball_off_path_mm": _off_path(one), "time_s": finite(one.seconds[one.taken]),
+                     "off_path_mm": _off_path(one), "time_s": finite(one.seconds[one.taken]),
                      "reference_time_s": finite(one.seconds[0]),
                      "control_s": None if one.on_control is None else one.on_control[1],
                      "reference_control_s": None if one.on_control is None else one.on_control[0]}

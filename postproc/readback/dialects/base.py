@@ -33,6 +33,7 @@ from postproc.readback.text.clamps import clamp_numbers, two_meanings
 from postproc.readback.text.flow import Structure, expand
 from postproc.readback.text.magnitude import negative_smoothing, too_large
 from postproc.readback.text.modal import GROUPS, Groups, check_codes, check_end, codes, drop_passive
+from postproc.readback.text.not_executed import named
 from postproc.readback.text.rollover import unrolled
 from postproc.readback.text.tool_names import numbered_tools
 from postproc.readback.text.words import Words
@@ -147,6 +148,11 @@ class Reader(ABC):
     def read(self, data: bytes | str, file: str = "", others: Mapping[str, bytes] | None = None,
              ) -> tuple[Canonical | None, list[Diagnostic]]:
         """A program, with the files of its subprograms by name, as canonical words; None where it cannot be read."""
+        code, found = self._read(data, file, others)
+        return code, named(found, as_bytes(data), self.language, file) if has_errors(found) else found
+
+    def _read(self, data: bytes | str, file: str, others: Mapping[str, bytes] | None,
+              ) -> tuple[Canonical | None, list[Diagnostic]]:
         self.main_file = file
         if self.in_macros(as_bytes(data)):
             return self.executed(as_bytes(data), file, others or {})

@@ -182,7 +182,13 @@ class FanucReader(IsoReader):
             if number not in range(1, self.last_offset + 1):
                 found.append(error("gcode.offset", f"G{self.extended_offset:g} P{number:g}: there is no such work offset",
                                    file=file, lines=[int(line[b])], hint=f"P1 to P{self.last_offset}"))
-        for b in codes(words, "G", (5.1,))[0].tolist():
+        laws = codes(words, "G", (5.1,))[0]
+        level = np.isin(words.letter, [ord("Q"), ord("R")]) & np.isin(words.line, laws)
+        if words.point is not None and (words.point & level).any():
+            found.append(error("gcode.decimal_point", "Q or R of G05.1 with a decimal point: its page has whole numbers",
+                               file=file, lines=line[words.line[words.point & level]][:6].tolist(),
+                               hint="write a whole number"))
+        for b in laws.tolist():
             self.contour_control(take(words, drop, b, "QR"), int(line[b]), file, found)
         self.modes(words, new, drop, line, file, found)
         self.reference(words, new, drop, line, file, found)

@@ -72,9 +72,9 @@ class PlaneWords:
 
     def _checked(self, words: Sequence[Word], codes: set[float]) -> None:
         """Words whose unit is not certain, which would be written on with a point, and codes that the control has not."""
-        if self.haas and codes & {16.0, 50.1}:
-            raise MacroFault("gcode.unknown_code", f"G{16.0 if 16.0 in codes else 50.1:g} is no code of Haas",
-                             "write the points by X and Y")
+        if self.haas and codes & {15.0, 16.0, 50.1}:
+            raise MacroFault("gcode.unknown_code", f"G{min(codes & {15.0, 16.0, 50.1}):g} is no code of Haas",
+                             "write the points by X and Y, without polar coordinates")
         if codes & {50.0, 50.1} and any(w.letter in (*AXES, *CENTRES) for w in words):
             raise MacroFault("gcode.mode", "G50 and G50.1 with axes are not executed", "write them alone, before any G51")
         letters = (*self.track.held.axes, "R", *(CENTRES if self.polar or self.turned is not None else ()))

@@ -183,7 +183,8 @@ def check_codes(words: Words, groups: Groups, m_codes: tuple[float, ...], letter
             diagnostics.append(error("gcode.unknown_code", f"{what}{value:g} is not executed by this reader", file=file,
                                      lines=lines[:6].tolist(), count=len(lines),
                                      hint="take it out; a code of the shop that moves nothing is named in "
-                                     "program.passive of the controller file, or in [hooks] passive (--hooks FILE)"))
+                                     "program.passive of the controller file, or in [hooks] passive (--hooks FILE), "
+                                     "one of its smoothing (G05 P10000 and G05 P0, G61.1) with mm in [smoothing_words]"))
     for code in distinct(words.letter[~known]):
         lines = words.line[words.letter == code]
         diagnostics.append(error("gcode.unknown_word", f"word {chr(code)}: the machine has no such axis", file=file,

@@ -9,6 +9,7 @@ import pytest
 
 import machines
 from machines.exchange.export import export_linuxcnc
+from machines.exchange.linuxcnc_files import EDGE
 from machines.exchange.read import import_machine
 from machines.machine import Machine
 
@@ -216,12 +217,15 @@ EXPRESSED = ("fork-head-ab", "head-table", "linuxcnc-lineardelta", "linuxcnc-xyz
 
 @pytest.mark.parametrize("name", EXPRESSED)
 def test_there_and_back(name: str, tmp_path: Path) -> None:
-    """Kinematics, limits, home, turns, timing, what is assumed."""
+    """Kinematics, limits, home, turns, timing, what is assumed; travel ends a trace later (stops at home)."""
     ours = machines.load(name)
     back = there_and_back(ours, tmp_path)
     assert (back.axis_names, back.rotary, back.structure) == (ours.axis_names, ours.rotary, ours.structure)
-    for mine, theirs in zip(vars(back.limits).values(), vars(ours.limits).values(), strict=True):
-        assert mine == theirs if isinstance(mine, frozenset) else np.allclose(mine, theirs, rtol=1e-14, atol=0)
+    for what, mine in vars(back.limits).items():
+        theirs, trace = getattr(ours.limits, what), 2.0 * EDGE if what in ("lower", "upper") else 0.0
+        assert mine == theirs if isinstance(mine, frozenset) else np.allclose(mine, theirs, rtol=1e-14, atol=trace)
+    ends = np.isfinite(ours.limits.lower), np.isfinite(ours.limits.upper)
+    assert (back.limits.lower < ours.limits.lower)[ends[0]].all() and (back.limits.upper > ours.limits.upper)[ends[1]].all()
     np.testing.assert_allclose(back.home, ours.home, rtol=1e-14)
     assert (back.turns, back.timing, back.retract_axis) == (ours.turns, ours.timing, ours.retract_axis)
     assert (back.control_kinematics is None) == (ours.control_kinematics is None)

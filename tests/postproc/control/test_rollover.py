@@ -22,6 +22,7 @@ from postproc.cycle_time.conversion import estimate_of
 from postproc.pipeline.result import PostResult
 from postproc.readback.dialects.readers import reader_for
 from postproc.report.summary import as_dict, as_text
+from postproc.witness.turning import check_turning
 from postproc.writing.writer import Writer
 from tests.postproc.kit import TOOLS, codes, tilted, toolpath
 from toolpaths.diagnostics import DiagnosticError, Severity
@@ -211,6 +212,13 @@ def test_a_reader_of_the_other_rule_is_caught_by_the_second_witness(controller: 
     assert not result.ok and errors(result) & {"witness.turning", "verify.path", "verify.axis", "verify.rapid", "verify.tip",
                                                "gcode.rollover", "verify.not_reached", "verify.feed", "verify.too_fast",
                                                "verify.off_path"}
+
+
+def test_a_turn_by_the_other_rule_is_a_finding_of_the_second_witness(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("postproc.witness.second_reading.check_turning", lambda case, executed: check_turning(
+        replace(case, modulo=dict.fromkeys(case.modulo, "sign")), executed))
+    result = postproc.convert(winding(-1.0), rolling("shortest"), "fanuc-30i", TOOLS, Options(output="axes"))
+    assert errors(result) == {"witness.turning"} and result.text == ""
 
 
 def test_tip_modes_enter_at_the_nearest_whole_turn() -> None:

@@ -135,8 +135,9 @@ def test_the_bound_counts_the_most_that_an_operation_leaves_to_the_control() -> 
     plain, rough = (good(convert(part(), MACHINE, "haas-ngc", one)) for one in (setup(), setup(ROUGH="roughing")))
     assert plain.shares["smoothing"] == pytest.approx(0.003) and rough.shares["smoothing"] == pytest.approx(0.005)
     assert rough.shares["linearising"] < plain.shares["linearising"]
-    refused = convert(part(), MACHINE, "haas-ngc", setup(ROUGH=0.02))
-    assert codes(refused.diagnostics) >= {"tolerance.smoothing"}
+    for controller in LEVELS:   # a number means the same on a control that has levels instead (G05.1 Q1 R1 would take less)
+        refused = convert(part(), MACHINE, controller, setup(ROUGH=0.02))
+        assert codes(refused.diagnostics) >= {"tolerance.smoothing"}, controller
 
 
 @pytest.mark.parametrize(("controller", "asked", "block"), [
@@ -185,6 +186,20 @@ def test_a_word_of_the_shop_states_what_it_may_move_by(word: str, tmp_path: Path
     assert "verify.smoothing" in codes(convert(part(), MACHINE, own, setup()).diagnostics)
     own.write_text(own.read_text().split("smoothing_words")[0])
     assert not convert(part(), MACHINE, own, setup()).ok or word == "G05.1 Q1 R5"
+
+
+@pytest.mark.parametrize(("on", "off"), [("G05 P10000", "G05 P0"), ("G61.1", "G64")])
+def test_a_program_with_words_of_the_shop_is_read_in_every_spelling_of_them(on: str, off: str, tmp_path: Path) -> None:
+    """On and off, with and without zeros and blanks; unnamed they are refused, and the hint names [smoothing_words]."""
+    own = shop_file(tmp_path, f'smoothing_words = {{ "{on}" = 0.002, "{off}" = 0.0 }}\n', "fanuc-30i")
+    usual, made = (good(convert(part(), MACHINE, c, setup())) for c in ("fanuc-30i", own))
+    for first in (on, on.replace("G05 P", "G5P")):
+        text = made.text.replace("G05.1 Q1", first).replace("G05.1 Q0", off)
+        assert made.job is not None and usual.job is not None and first in text
+        _, found = read_back(text, made.job, "part.cls")
+        assert not [d for d in found if d.severity is Severity.ERROR], first
+        _, found = read_back(text, usual.job, "part.cls")
+        assert "[smoothing_words]" in next(d.hint for d in found if d.code == "gcode.unknown_code")
 
 
 def test_it_is_not_changed_while_a_mode_is_on_where_the_control_cannot() -> None:

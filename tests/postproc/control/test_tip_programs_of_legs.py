@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -154,3 +155,14 @@ def test_cranks_that_the_module_cannot_be_are_refused(old: str, new: str, words:
     (tmp_path / "own.toml").write_text(text.replace("[control]", '[control]\nmodule = "rotarydeltakins"'), "utf-8")
     machine, found = load_checked(tmp_path / "own.toml")
     assert machine is None and any(words in str(d) for d in found), [str(d) for d in found]
+
+
+def test_where_a_length_goes_is_looked_for_once_a_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Z of a trunnion moves the tip along the tool, one drive of a Delta or a hexapod does not: the same for every program."""
+    for name, along in (("linear-delta-ac", False), ("hexapod", False), ("mikron-ucp710", True)):
+        m = replace(machines.load(name))
+        z = m.axis_names.index("Z") if "Z" in m.axis_names else 2
+        assert m.moves_along_tool(z) is along, name
+        monkeypatch.setattr(type(m.kinematics), "forward", lambda *asked: pytest.fail("looked for again"))
+        assert m.moves_along_tool(z) is along
+        monkeypatch.undo()

@@ -39,11 +39,15 @@ CASES = [("five_faces.cls", "mikron-ucp710", "fanuc-30i", "tools"),
          ("h4a_indexed.cls", "h4a-c-table", "linuxcnc", "h4a")]
 
 
+TWO = (0, 1)
+"""operations of samples with many sides alike, the tool turned between them"""
+
+
 @cache
 def converted(sample: str, machine: str, controller: str, setup: str) -> PostResult:
     options = Options(setup=str(SAMPLES / f"{setup}.setup.toml"),
                       error_model=str(SAMPLES / f"errors/{machine}.toml"))
-    return postproc.convert(few_sides(sample), machine, controller, options=options)
+    return postproc.convert(few_sides(sample, (0, 4, 5) if "h4a" in sample else None), machine, controller, options=options)
 
 
 @pytest.mark.covering(of=("machine",))
@@ -52,7 +56,7 @@ def test_points_are_inside_the_rounding_of_their_words(sample: str, machine: str
                                                        setup: str) -> None:
     result = converted(sample, machine, controller, setup)
     found = after_formatting(result)
-    assert result.ok and found is not None and result.job is not None and len(found.points) > 10
+    assert result.ok and found is not None and result.job is not None and len(found.points) > 8
     assert found.tip.max() <= min(1.1 * result.job.rounding.tip, found.tip_bound)
     assert found.axis.max() <= found.axis_bound
     assert np.median(found.tip) > 0.1 * result.job.rounding.tip
@@ -202,9 +206,8 @@ def turning_back(result: PostResult) -> int:
 def test_axes_with_lost_motion_never_turn_back_by_a_last_decimal(sample: str, machine: str, seed: int,
                                                                  tmp_path: Path) -> None:
     model = both_directions_of_all(tmp_path, machine, seed)
-    path, found = toolpaths.read(SAMPLES / sample)
     options = Options(setup=str(SAMPLES / "tools.setup.toml"), error_model=str(model), output="axes")
-    result = postproc.convert(path, machine, "linuxcnc", options=options, diagnostics=found)
+    result = postproc.convert(few_sides(sample, TWO), machine, "linuxcnc", options=options)
     left = after_formatting(result)
     assert result.ok and left is not None, [str(d) for d in result.diagnostics]
     assert turning_back(result) == 0

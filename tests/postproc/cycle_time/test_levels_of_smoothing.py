@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.cycle_time.estimate import timed, total
+from postproc.cycle_time.estimate import estimate, timed, total
 from tests.postproc.time_kit import blocks, machine, model
 
 CUTS = "G0 X0. Y0.\nG1 F3000.\n" + "\n".join(
@@ -44,3 +44,24 @@ def test_a_program_of_two_levels_takes_what_both_parts_take_and_a_rest_between()
     parts = [seconds(f"G05.1 Q1 R{r}", "fanuc-30i", "fanuc") for r in (1, 10)]
     assert total(b, times) == pytest.approx(sum(parts), rel=0.05)
     assert np.isclose(times.seconds.sum() + times.pause.sum(), total(b, times), rtol=0.02)
+
+
+TURNS = "G21 G90 G94 G17 {words}\nG0 X0 Y0 Z0\nG1 X1 F1000\nX2 Y1\n"
+
+
+def test_a_stated_tolerance_holds_behind_g64_and_says_what_a_turn_counts() -> None:
+    on = machine("mikron-ucp710")
+    stated = blocks(TURNS.format(words="G64\nCYCLE832(0.003,_ORI_FINISH,0.015)").replace("G21", "G710"), on, "siemens-840d")
+    assert stated.tolerance[-1] == pytest.approx(0.003)
+    assert stated.arms.tolist() == pytest.approx([1.0, 1.0, 1.0, *[0.003 / np.radians(0.015)] * 2])
+    silent = blocks(TURNS.format(words="G64").replace("G21", "G710"), on, "siemens-840d")
+    assert not np.isfinite(silent.tolerance[-1]) and silent.arms.tolist() == [1.0, 1.0, 1.0, 50.0, 50.0]
+
+
+def test_a_tolerance_that_the_program_states_is_not_assumed() -> None:
+    on = machine("mikron-ucp710")
+    zigzag = "\n".join(f"X{k % 2 * 3} Y{k * 0.2:.1f}" for k in range(20))
+    stated, silent = (estimate(blocks(TURNS.format(words=f"G64{words}").replace("G21", "G710") + zigzag, on, "siemens-840d"),
+                               on, model("siemens")).assumed for words in ("\nCYCLE832(0.01,_FINISH,1)", ""))
+    assert stated["corner_tolerance"] == 0.0 < stated["stated_share"] < 0.5 * silent["corner_tolerance"]
+    assert silent["stated_share"] == 0.0

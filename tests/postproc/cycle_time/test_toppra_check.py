@@ -44,7 +44,7 @@ def test_a_plan_that_is_too_fast_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_without_toppra_one_line_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "toppra", None)
-    with pytest.raises(DiagnosticError, match=r"time\.toppra.*pip install toppra"):
+    with pytest.raises(DiagnosticError, match=r"extra\.missing.*postproc\[check\]"):
         check(good(convert(toolpath(*LINES), "mill-3axis")))
 
 

@@ -8,6 +8,9 @@ import re
 from postproc.explain.pages import pages
 from tests.explained_codes import MADE, NONE, ROOT, codes, said_codes
 from tests.postproc.cli.test_cli import run
+from tests.said import Hearing, missing, said
+from tests.source import written
+from toolpaths.diagnostics import error
 
 HOW = "run python tests/explained_codes.py"
 
@@ -41,10 +44,45 @@ def test_codes_put_together_are_codes_of_the_source() -> None:
         assert any(f'f"{area}.{{' in path.read_text("utf-8") for path in (ROOT / "postproc").rglob("*.py")), area
 
 
+NO_FILE = {
+    "place.plan": "a planner that gives up on a path that it has taken at another place",
+    "orient.plan": "a planner that gives up on a pass that it has timed before",
+    "plan.failed": "a planner that finds no motion at any speed",
+    "place.unsolved": "a solver that does not reach the least time where it has a path",
+    "sensitivity.kind": "a kind of machine without errors of any axis: all that there are have some",
+}
+"""codes that no input is known to lead to, and what would have to happen"""
+
+
 def test_each_page_says_what_to_do() -> None:
     for page in pages().values():
         assert len(page.about) > 10 and len(page.first) > 20 and page.text().startswith(page.code)
-    assert sum(bool(page.example) for page in pages().values()) > 40
+
+
+def test_each_page_has_an_example_that_a_test_is_told() -> None:
+    assert {code for code, page in pages().items() if not page.example} == set(NO_FILE), (
+        "give it a test; pytest --said FILE TESTS, python tests/said.py FILE, python tests/explained_codes.py")
+
+
+def test_what_is_said_with_a_hint_has_it_as_a_remedy() -> None:
+    """A hint passed by a name is found in the source, or taken from what a test is told."""
+    hinted = {code for code, one in said().items() if "; " in one["text"] and one.get("hint")}
+    assert hinted and all(pages()[code].remedies for code in hinted)
+
+
+def test_examples_are_of_tests_that_there_are() -> None:
+    """Each is compared with what the test is told whenever that runs (`tests/said.py`)."""
+    for code, one in said().items():
+        file, _, name = one["test"].partition("::")
+        assert code in pages() and f"def {name.partition('[')[0]}(" in written(ROOT / file), code
+
+
+def test_a_test_that_is_told_otherwise_fails() -> None:
+    with Hearing() as hearing:
+        error("cl.cutter", "CUTTER/-3: a diameter is above 0", file="/some/folder/part.apt", lines=[4])
+    assert "part.apt:0: error [cl.cutter] CUTTER/0: a diameter is above 0" in hearing.texts()["cl.cutter"]
+    assert missing({"cl.cutter": "part.apt:9: error [cl.cutter] CUTTER/-1: a diameter is above 0"}, hearing.texts()) == {}
+    assert missing({"cl.cutter": "part.apt:9: error [cl.cutter] a diameter"}, hearing.texts()) != {}
 
 
 def test_the_command() -> None:

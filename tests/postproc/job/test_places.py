@@ -19,6 +19,7 @@ from postproc.reference.repeated import Repeated, repeated
 from postproc.setup.model import SetupFile, at_places
 from postproc.setup.places import PlaceOrder
 from postproc.verification.read_back import read_back
+from postproc.verification.second_witness import _order
 from tests.postproc.kit import body, codes, few_sides, good
 from toolpaths.arrays import Floats, Ints
 
@@ -92,6 +93,14 @@ def test_order_by_tool_changes_tools_once() -> None:
     assert sequence(by_tool) == [(0, 1), (1, 1), (0, 2), (1, 2)]
     assert sequence(by_part) == [(0, 1), (0, 2), (1, 1), (1, 2)]
     assert [sum(" M6" in block for block in body(one.text)) for one in (by_tool, by_part)] == [2, 4]
+
+
+def test_places_in_the_other_order_are_a_finding_of_the_second_witness() -> None:
+    found = made("pocket.cls", "mill-3axis", "linuxcnc", places=TWO, order="part")
+    assert found.comparison is not None and found.job is not None
+    for order, said in (("part", []), ("tool", ["witness.order"])):
+        setup = SetupFile.model_validate({"tools": TOOLS, "places": TWO, "order": order})
+        assert [d.code for d in _order(setup, found.comparison, found.job)] == said
 
 
 def test_operations_of_a_place_stay_in_order() -> None:

@@ -23,19 +23,24 @@ CONE = 8.0
 OPTIONS = Options(orient="auto")
 
 
-def swing(middle: str = "", normals: bool = False, head: list[str] | None = None, cuts: int = 1) -> Toolpath:
-    """Cuts over a cylinder along y of radius 80 mm, the axis 25 degrees off its normal, which swings by 70 degrees about it
-    within some 12 mm: C hurries there, and has time before and behind. `middle`: a record amid each cut."""
+def swing(middle: str = "", normals: bool = False, head: list[str] | None = None, cuts: int = 1,
+          end: tuple[float, float] = (0.0, 3.0), radius: float = 80.0, lean: float = 25.0) -> Toolpath:
+    """Cuts over a cylinder along y, the axis 25 degrees off its normal, which swings by 70 degrees about it
+    within some 12 mm: C hurries there, and has time before and behind. `middle`: a record amid each cut; `end`: mm from
+    the axis to the corner's centre, and its radius."""
     lines = list[str]()
     for k in range(cuts):
         x = np.linspace(-24.0, 24.0, 33)
-        normal = np.column_stack((np.sin(x / 80.0), 0.0 * x, np.cos(x / 80.0)))
+        normal = np.column_stack((np.sin(x / radius), 0.0 * x, np.cos(x / radius)))
         turn = np.radians(20.0 + 35.0 * (1.0 + np.tanh(x / 6.0)))
         flat = np.column_stack((np.cos(turn), np.sin(turn), 0.0 * x))
-        axis = np.cos(np.radians(25.0)) * normal + np.sin(np.radians(25.0)) * flat
+        axis = np.cos(np.radians(lean)) * normal + np.sin(np.radians(lean)) * flat
         axis /= np.linalg.norm(axis, axis=1, keepdims=True)
-        centre = 83.0 * normal + np.array([0.0, 2.0 * k, -80.0])
-        tip = centre - 3.0 * axis
+        centre = (radius + end[1]) * normal + np.array([0.0, 2.0 * k, -radius])
+        tip = centre - end[1] * axis
+        if end[0]:
+            out = np.einsum("ni,ni->n", normal, axis)[:, None] * axis - normal
+            tip -= end[0] * out / np.linalg.norm(out, axis=1, keepdims=True)
         rows = [",".join(f"{v:.7f}" for v in (*p, *a, *(n if normals else ()))) for p, a, n in
                 zip(tip, axis, normal, strict=True)]
         off = [",".join(f"{v:.7f}" for v in (*(p + 20.0 * a), *a)) for p, a in ((tip[0], axis[0]), (tip[-1], axis[-1]))]

@@ -107,10 +107,10 @@ def test_bound_is_never_below_dense_truth(name: str, law: str) -> None:
     curves, q0, q1 = curves_for(name, 24, 9)
     assert len(curves) >= 9
     n = len(curves)
+    real = truth(name, control, curves, q0, q1, np.zeros(n), np.ones(n))
+    stretch = CurveBlocks(curves, np.zeros(n), np.ones(n), q0, q1, kin.forward(q0), kin.forward(q1))
     for near in (1e9, 1e-9):
-        stretch = CurveBlocks(curves, np.zeros(n), np.ones(n), q0, q1, kin.forward(q0), kin.forward(q1))
         bound = bounds(control, kin, stretch, near, near)
-        real = truth(name, control, curves, q0, q1, np.zeros(n), np.ones(n))
         assert (bound[0] >= real[0] - 1e-9).all() and (bound[1] >= real[1] - 1e-9).all()
     got = linearise(control, kin, curves, q0, q1, np.zeros(n, dtype=bool), TIP, AXIS)
     assert not len(got.broken)

@@ -252,3 +252,14 @@ def test_places_that_cannot_be_converted_are_left(good_from: float, taken: float
     best, found = _proved(proof, timer, known[0], now)
     assert best is not None and best.place[0] == taken
     assert [d.code for d in found] == ["place.passed_over"] * failures
+
+
+def test_where_no_place_can_be_converted_the_first_reason_is_said() -> None:
+    known = [tried_at(25.0 * k, 1.0 + 0.01 * k) for k in range(13)]
+    now = replace(tried_at(7.0, 9.0), refused="outside travel")
+    wrong = error("link.blocked", "the links stay inside no workspace", hint="lower clearance.margin")
+    proof = SimpleNamespace(options=Options(), of=lambda one: (np.nan, wrong))
+    timer = SimpleNamespace(known=lambda: known, space=SimpleNamespace(holds=lambda place: True))
+    best, found = _proved(proof, timer, known[0], now)
+    assert best is None
+    assert [(d.code, d.hint) for d in found] == [("place.proof", wrong.hint)] and wrong.message in found[0].message

@@ -142,6 +142,12 @@ def test_verify_names_the_input_that_changed(shop: Path, tmp_path: Path, what: s
     assert (found["code"], found["severity"]) == (f"proof.{what}", "warning") and named in found["message"]
 
 
+def test_a_proof_of_another_version_is_said_to_be_one(shop: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("postproc.proof.changes.VERSION", "99.0")
+    got = run("verify", shop / "p.ngc", shop / "part.apt", *options(shop))
+    assert got.exit_code == 0 and "[proof.version]" in got.stderr and "this is 99.0" in got.stderr, got.stderr
+
+
 def test_the_hint_of_a_changed_input_is_followed(shop: Path, tmp_path: Path) -> None:
     """`give the one of the proof, or convert again with --proof`: after either nothing is named any more."""
     folder = tmp_path / "copy"

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import ast
 import doctest
 import subprocess
 import sys
+import sysconfig
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import machines
 import postproc
+import toolpaths
 from postproc.setup.model import SetupFile
 from tests.postproc.orientation.part_choice import PART
 from tests.postproc.placement.test_placement import passes, setup_of
@@ -25,9 +30,20 @@ def test_every_example_of_the_page_gives_what_it_shows(monkeypatch: pytest.Monke
     monkeypatch.chdir(SAMPLES)
     done = doctest.testfile(str(ROOT / "docs" / "python.md"), module_relative=False)
     assert done.attempted > 20 and done.failed == 0
-    lines = (ROOT / "docs" / "python.md").read_text("utf-8").splitlines()
-    shown = " ".join(line for line in lines if line[:3] in (">>>", "..."))
-    assert [name for name in postproc.__all__ if name.islower() and f"postproc.{name}(" not in shown] == []
+    examples = doctest.DocTestParser().get_examples((ROOT / "docs" / "python.md").read_text("utf-8"))
+    code = ast.parse("".join(one.source for one in examples))
+    named = {ast.unparse(node) for node in ast.walk(code) if isinstance(node, ast.Attribute)}
+    public = {f"{package.__name__}.{name}" for package in (postproc, machines, toolpaths) for name in package.__all__}
+    assert public - named - {"postproc.Toolpath"} == set()  # imported by its name there
+
+
+def test_an_editable_install_is_a_line_that_type_checkers_follow() -> None:
+    """A module that finds the packages when they are imported is followed by no type checker."""
+    lines = [one.read_text("utf-8") for one in Path(sysconfig.get_path("purelib")).glob("__editable__.postproc-*.pth")]
+    assert [line for line in lines if line.startswith("import ")] == []
+    layout = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["setuptools"]["package-dir"]
+    assert layout == {"": "."} and all(Path(package.__file__).with_name("py.typed").exists()
+                                       for package in (postproc, machines, toolpaths))
 
 
 def test_all_names_are_there() -> None:

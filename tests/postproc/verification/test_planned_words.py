@@ -82,12 +82,12 @@ def test_plans_beyond_the_limits_of_the_machine_file_are_refused(order: str, mon
                                             ("blade.cls", "mikron-ucp710"), ("pocket.cls", "uranesx"),
                                             ("pocket.cls", "mill-3axis"), ("five_faces.cls", "fork-head-ab")])
 def test_no_sample_is_refused_for_its_plan(file: str, name: str, controller: str, options: dict[str, Any]) -> None:
-    short = few_sides(file, (1,) if file == "pocket.cls" else None, 26 if file == "pocket.cls" else 50)
+    short = few_sides(file, (1,) if file == "pocket.cls" else None, 26 if file == "pocket.cls" else 36)
     result = convert(short, name, controller, feed="planned", **options)
     assert refused(result) == set() and result.text
 
 
 def test_corrected_programs_carry_their_plan() -> None:
-    result = convert(few_sides("five_faces.cls", (1, 2)), "mikron-ucp710", "siemens-840d", feed="planned",
+    result = convert(few_sides("five_faces.cls", (1,)), "mikron-ucp710", "siemens-840d", feed="planned",
                      error_model=ERRORS)
     assert refused(result) == set() and result.text

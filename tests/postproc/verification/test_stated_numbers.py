@@ -15,9 +15,11 @@ from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile
 from postproc.setup.places import PlaceSetup
 from postproc.verification.stated_numbers import check_header
-from tests.postproc.kit import SAMPLES, convert
+from tests.postproc.kit import convert, few_sides
 from toolpaths.diagnostics import Severity
 
+SOME = (1, 2)
+"""operations of the pocket: one with each tool"""
 CONTROLS = ("linuxcnc", "generic-iso", "fanuc-30i", "haas-ngc", "siemens-840d", "heidenhain-tnc640")
 SETUP = SetupFile.model_validate({
     "tools": {"1": {"gauge_length": 120.0}, "2": {"gauge_length": 95.5}}, "part": {"origin": (37.0, -23.0, 11.25)}})
@@ -25,7 +27,7 @@ SETUP = SetupFile.model_validate({
 
 def made(control: str, inch: bool) -> PostResult:
     setup = SETUP.model_copy(update={"output": SETUP.output.model_copy(update={"units": "inch"})}) if inch else SETUP
-    return convert(toolpaths.read(SAMPLES / "five_tilted.cls")[0], "mikron-ucp710", control, setup)
+    return convert(few_sides("five_tilted.cls"), "mikron-ucp710", control, setup)
 
 
 def headers(result: PostResult, text: str) -> list[str]:
@@ -52,9 +54,9 @@ def test_a_number_changed_in_the_header_is_found(control: str, inch: bool) -> No
 
 def test_verify_and_convert_ask_for_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     result, program = made("fanuc-30i", False), tmp_path / "p.nc"
-    path, found = toolpaths.read(SAMPLES / "five_tilted.cls")
+    path = few_sides("five_tilted.cls")
     program.write_text(result.text.replace("X37.0000 Y", "X36.0000 Y"), "utf-8")
-    said = postproc.verify(program, path, "mikron-ucp710", "fanuc-30i", SETUP, diagnostics=found)
+    said = postproc.verify(program, path, "mikron-ucp710", "fanuc-30i", SETUP)
     assert [d.code for d in said.diagnostics if d.severity is Severity.ERROR] == ["verify.header"]
     monkeypatch.setattr(program_header, "_work_offsets", lambda job: [
         line.replace("X37", "X36") for line in _work_offsets(job)])
@@ -66,7 +68,7 @@ def test_offsets_under_each_others_names_are_found(control: str) -> None:
     setup = SETUP.model_copy(update={"places": [
         PlaceSetup(name="left", work_offset_code="G54", origin=(-30.0, 0.0, 20.0)),
         PlaceSetup(name="right", work_offset_code="G57", origin=(90.0, -10.0, 5.0))]})
-    result = convert(toolpaths.read(SAMPLES / "pocket.cls")[0], "mill-3axis", control, setup)
+    result = convert(few_sides("pocket.cls", SOME), "mill-3axis", control, setup)
     left, right = re.findall(r"(?i)work offset (.+?) in machine", result.text)[:2]
     other = {left: right, right: left}
     text = re.sub(r"(?i)(?<=work offset )(.+?)(?= in machine)", lambda m: other[m[0]], result.text)
@@ -83,7 +85,7 @@ def test_a_line_that_is_missing_is_found_and_a_folded_one_is_read(control: str, 
     setup = SETUP.model_copy(update={"places": [
         PlaceSetup(name="left", work_offset_code="G54", origin=(-30.0, 0.0, 20.0)),
         PlaceSetup(name="right", work_offset_code="G57", origin=(90.0, -10.0, 5.0))]})
-    path = toolpaths.read(SAMPLES / "pocket.cls")[0]
+    path = few_sides("pocket.cls", SOME)
     for by in (control, str(shop)):
         result = convert(path, "mill-4axis", by, setup)
         assert result.ok and headers(result, result.text) == []
@@ -118,7 +120,7 @@ def test_how_tables_stand_for_a_work_offset_is_read() -> None:
     setup = SETUP.model_copy(update={"places": [
         PlaceSetup(name=f"face {k}", work_offset_code=f"G5{4 + k}", origin=(-20.0, 0.0, 60.0), turn={"A": 90.1234567 * k},
                    measured="turned") for k in range(3)]})
-    result = convert(toolpaths.read(SAMPLES / "pocket.cls")[0], "mill-4axis", "fanuc-30i", setup)
+    result = convert(few_sides("pocket.cls", SOME), "mill-4axis", "fanuc-30i", setup)
     assert result.ok and headers(result, result.text) == []
     for other in (" WITH A AT 0:", ":"):
         found = headers(result, result.text.replace(" WITH A AT 90.1235:", other))

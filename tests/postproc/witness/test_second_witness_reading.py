@@ -14,9 +14,10 @@ import toolpaths
 from machines.loader import builtin
 from postproc.report.summary import as_text
 from postproc.verification.second_witness import machine_tables
+from postproc.witness.clamps import limits_of
 from postproc.witness.clfile import commanded
 from postproc.witness.commanded import HOLE, LINE
-from postproc.witness.machine import Chain, Rods, kinematics_of, limits_of, merged
+from postproc.witness.machine import Chain, Rods, kinematics_of, merged
 from toolpaths.diagnostics import has_errors
 from toolpaths.toolpath import Kind, Role
 
