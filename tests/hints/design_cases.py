@@ -37,6 +37,8 @@ DESIGN = [
              (Edit(COMMAND, "2000,0,0", "0,0,-100"),)),
     HintCase("analysis.map", "machine analyse mill-3axis --map speed", {}, "leave (--map) out",
              (Edit(COMMAND, " --map speed", ""),)),
+    HintCase("analysis.map", "machine analyse tricept --map speed", {}, "leave (--map) out",
+             (Edit(COMMAND, " --map speed", ""),)),
     HintCase("analysis.map", "machine analyse mill-3axis --figure m.svg", {}, "leave (--figure) out",
              (Edit(COMMAND, " --figure m.svg", ""),)),
     HintCase("design.none", "machine design --box 100x100x10 --max bulk=20 -o d.toml", {}, "loosen (--max)",
