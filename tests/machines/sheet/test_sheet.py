@@ -209,11 +209,14 @@ def test_a_misspelt_key_hides_no_wrong_figure(tmp_path: Path) -> None:
     assert {d.code for d in faults} == {"file.unknown-key", "file.range", "sheet.figure"}, faults
 
 
-@pytest.mark.parametrize("word", ["counterclockwise", "Anti-Clockwise", "CCW", "anticlockwise"])
+@pytest.mark.parametrize("word", ["counterclockwise", "Anti-Clockwise", "CCW", "turns anticlockwise"])
 def test_a_jog_in_another_spelling(word: str, tmp_path: Path) -> None:
-    ours, other = (made(tmp_path, TRUNNION.replace('"anti-clockwise"', f'"{said}"')).machine
+    ours, other = (made(tmp_path, TRUNNION.replace('"anti-clockwise"', f'"{said}"').replace(
+        '"right up"', '"right side goes up"' if said == word else '"right up"').replace(
+            '["-35 deg", "120 deg"]', '"-35 to 120 deg"' if said == word else '["-35 deg", "120 deg"]')).machine
                    for said in (word, "anti-clockwise"))
-    assert ours is not None and other is not None and '"anti-clockwise"' in TRUNNION
+    assert ours is not None and other is not None and all(
+        was in TRUNNION for was in ('"anti-clockwise"', '"right up"', '["-35 deg", "120 deg"]'))
     q = np.array([[0.0, 0.0, 0.0, 0.2, 0.7]])
     np.testing.assert_array_equal(ours.kinematics.forward(q)[1], other.kinematics.forward(q)[1])
 
