@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from postproc.base.program_time import ControlPlan, ProgramTime
-from postproc.cycle_time.estimate import Estimate, estimate
+from postproc.cycle_time.estimate import Estimate, estimate, executed_by
 from postproc.cycle_time.model import CycleTimeModel, load_model, model_name
 from postproc.cycle_time.phases import summed
 from postproc.cycle_time.report import as_dict, clock
+from postproc.cycle_time.sampled import sampled
 from postproc.cycle_time.source import from_conversion
 from postproc.pipeline.result import PostResult
 from toolpaths.dataclass import dataclass
@@ -19,9 +20,6 @@ from toolpaths.diagnostics import read_value
 
 BAND_UP_TO = 20_000
 """blocks up to which a conversion also gives the band, which takes some ten estimates"""
-
-NOT_EXECUTED = frozenset(("time.control", "time.plan"))
-"""messages that say that the times of a model of an executed control are those of its formulas"""
 
 
 def model_of(result: PostResult, model: str = "") -> CycleTimeModel:
@@ -80,17 +78,20 @@ def program_clock(model: str = "") -> ControlClock:
 
 def estimate_of(result: PostResult, model: str = "", executed: bool = False) -> Estimate | None:
     """The estimate under the model of the controller, or under `model`; None where nothing is written. With `executed`
-    the control is executed where the model says how, as `postproc time` does: about 0.3 ms a block."""
+    the control is executed where the model says how, as `postproc time` does: about 0.3 ms a block; without it over some
+    stretches where axes turn (`sampled.py`)."""
     if not result.ok:
         return None
-    planner = _model(result, model) if executed else model_of(result, model)
+    planner = _model(result, model)
     blocks = from_conversion(result)
     if not len(blocks):
         return None
-    made = estimate(blocks, result.machine, planner, with_band=len(blocks) <= BAND_UP_TO)
-    if NOT_EXECUTED.isdisjoint(one.code for one in made.timed.found):
-        return made
-    return replace(made, model=planner.quick())
+    band = len(blocks) <= BAND_UP_TO
+    if not executed:
+        known = sampled(blocks, planner.of_machine(result.machine))
+        return estimate(blocks, result.machine, planner.quick(), with_band=band, times=known.times, off=known.off)
+    made = estimate(blocks, result.machine, planner, with_band=band)
+    return made if executed_by(made.timed) else replace(made, model=planner.quick())
 
 
 def figures(e: Estimate | None) -> dict[str, Any]:
