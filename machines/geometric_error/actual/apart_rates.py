@@ -7,7 +7,7 @@ is different, e with errors and n without, the end of a rod moving by x' = v + w
 
 so that dJ is small because errors are, however far the drives go; what moves both alike does not count. dr and db grow by dJ
 and by what turns them; a bound of dJ that comes out smaller than it was assumed holds all along the move, by continuity. A
-platform held by planes has their rows too (`kinematics/legs/holds.py`); the end on a ring is where it is nearest.
+platform held by planes has their rows too (`kinematics/holds.py`); the end on a ring is where it is nearest.
 """
 
 from __future__ import annotations

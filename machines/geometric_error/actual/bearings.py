@@ -21,8 +21,8 @@ import numpy as np
 
 from machines.geometric_error.actual.rods import RodErrors
 from machines.geometric_error.actual.transforms import turns
+from machines.kinematics.holds import Holds
 from machines.kinematics.legs.drives import Drives
-from machines.kinematics.legs.holds import Holds
 from machines.kinematics.legs.loops import Loops
 from toolpaths.arrays import Floats, Ints
 

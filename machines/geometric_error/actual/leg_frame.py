@@ -32,8 +32,8 @@ from machines.geometric_error.actual.rods import RODS, RodErrors, guide_frame, i
 from machines.geometric_error.actual.transforms import turns
 from machines.kinematics.base import Kinematics
 from machines.kinematics.columns import blocks
+from machines.kinematics.holds import Holds
 from machines.kinematics.legs.drives import Drives
-from machines.kinematics.legs.holds import Holds
 from machines.kinematics.legs.in_series import LegsInSeries
 from machines.kinematics.legs.loops import FREEDOMS, Loops, turned
 from machines.kinematics.legs.on_legs import OnLegs

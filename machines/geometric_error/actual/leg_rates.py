@@ -16,7 +16,7 @@ from machines.geometric_error.actual.bar_loops import bars_motion
 from machines.geometric_error.actual.leg_frame import LegFrame
 from machines.geometric_error.actual.rod_rates import HeldLoops, HoldRates, PlatformMotion, RingRates, SharedLoops
 from machines.geometric_error.actual.rods import RodErrors, inverted
-from machines.kinematics.legs.holds import Holds
+from machines.kinematics.holds import Holds
 from machines.kinematics.legs.loops import Loops
 from toolpaths.arrays import Floats, Ints
 
