@@ -1,5 +1,5 @@
 """Formulas held against the control, executed over some stretches of a program: where axes turn, what formulas are off
-depends on how points stand along curves (0.84 to 1.42 of their time on one path); a few hundred blocks executed say how much.
+depends on how points stand along curves (0.84 to 1.42 of their time on one path); a few hundred executed blocks say it.
 """
 
 from __future__ import annotations

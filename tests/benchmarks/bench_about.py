@@ -30,7 +30,7 @@ def processor() -> float:
 
 def main(controls: tuple[str, ...]) -> int:
     outside = 0
-    print("| file | control | blocks | about s | band s | executed s | off | processor s |\n|---|---|---|---|---|---|---|---|")
+    print("| file | control | blocks | about s | band s | executed s | off | processor s |\n" + 8 * "|---" + "|")
     for file, machine, setup in CASES:
         path, samples = read(ROOT / "samples" / file)[0], ROOT / "samples" / f"{setup}.setup.toml"
         for control in controls:
@@ -46,8 +46,8 @@ def main(controls: tuple[str, ...]) -> int:
             outside += not inside
             off = f"{100 * (about.seconds / executed.seconds - 1):+.1f} %{'' if inside else ' outside'}"
             band = f"{about.band[0]:.0f} to {about.band[1]:.0f}"
-            print(f"| {file} | {control} | {len(about.blocks)} | {about.seconds:.1f} | {band} | {executed.seconds:.1f} | {off} | "
-                  f"{took:.2f} |", flush=True)
+            print(f"| {file} | {control} | {len(about.blocks)} | {about.seconds:.1f} | {band} | {executed.seconds:.1f} | "
+                  f"{off} | {took:.2f} |", flush=True)
     return outside
 
 
