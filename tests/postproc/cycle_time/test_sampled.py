@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from postproc.cycle_time import sampled as room
+from postproc.cycle_time import conversion as room
 from postproc.cycle_time.blocks import MotionBlocks
+from postproc.cycle_time.conversion import sampled
 from postproc.cycle_time.estimate import estimate, timed, total
-from postproc.cycle_time.sampled import sampled
 from tests.postproc.time_kit import blocks, machine, model
 
 ON = machine("mikron-ucp710")
