@@ -93,7 +93,8 @@ class Job:
     @property
     def stock(self) -> Floats:
         """(2, 3) least, greatest X, Y, Z (mm, first work offset, tables at 0) of the stock, else the cuts, 1 mm or more"""
-        placed = (self.space.corners if self.setup.rewind.stock is None else self.stock_corners) - self.control.origin
+        stated = self.stock_corners
+        placed = (self.space.corners if stated is None else stated) - self.control.origin
         low, high = placed.min(axis=0), placed.max(axis=0)
         return np.stack([np.minimum(low, high - 1.0), high])
 
