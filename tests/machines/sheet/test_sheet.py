@@ -195,6 +195,9 @@ def test_odd_figures_come_with_what_cannot_be_read(tmp_path: Path) -> None:
     assert len(made(tmp_path, TRUNNION.replace('"900 ipm"', '"900 in/s"')).diagnostics) == 1, "of one figure"
     text = TRUNNION.replace("-558.4", "558.4").replace("2.8 s", "2.8 h")
     assert {d.code for d in made(tmp_path, text).diagnostics} == {"sheet.figure", "machine.plausible"}, "the sign of a pivot"
+    text = TRUNNION.replace('"762 mm"', '"762"').replace("-254.11", "254.11").replace("22.9 m/min", "22900 mm/s", 1)
+    found = made(tmp_path, text).diagnostics
+    assert [d.lines[0] for d in found] == [line_of(text, part) for part in ('"762"', "22900 mm/s", "MRZP")], found
     assert made(tmp_path, TRUNNION).unread == ("B", "C")
 
 
