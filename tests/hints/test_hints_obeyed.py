@@ -38,7 +38,7 @@ def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(survey, "PLACES", 500)
     monkeypatch.setattr(conversion, "BAND_UP_TO", 0)
     for name in ("MOST", "FEW"):
-        monkeypatch.setattr(f"machines.analysis.certify.{name}", 2_000)
+        monkeypatch.setattr(f"machines.analysis.certify.{name}", 500)
     for name, value in (("RESTARTS", 1), ("ROUNDS", 12), ("CROWD", 6), ("GRID", (3, 3, 2))):
         monkeypatch.setattr(layouts, name, value)
 
