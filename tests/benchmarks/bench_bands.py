@@ -4,10 +4,10 @@ python tests/benchmarks/bench_bands.py [CONTROLS]: for each of some controls wit
 (LinuxCNC's planner, the formulas of look-ahead with and without jerk and slower in short lines, the executed control with
 corners by their difference of feeds and with other shares of bends) the executed control, and for controls that are executed
 the formulas, are fitted to one to three programs, and the band asked for programs of six kinds. Printed: coverage and width
-of the bands of 95 % by kind, seen by the fit and not. Without a fit ("no fit"; "stated" where programs state a tolerance) the
+of the bands of 95 % by kind, seen by the fit and not. Without a fit ("no fit"; "stated" where they state a tolerance) the
 band of the executed control's own file (LinuxCNC's for its planner) is asked for the time of the same hidden control on
-the machine as its file describes it: its accelerations and jerks, what the model assumes hidden; formulas of look-ahead,
-which may be faster than their path's optimum, are executed there.
+the machine as its file describes it: its accelerations and jerks; what the model assumes is hidden. Formulas of
+look-ahead, which may be faster than their path's optimum, are executed there.
 """
 
 from __future__ import annotations
