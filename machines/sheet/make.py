@@ -17,7 +17,7 @@ from machines.sheet.jog import sense
 from machines.sheet.model import AxisSheet, DataSheet, TouchedSheet
 from machines.sheet.pivot_text import read_pivots
 from machines.sheet.pivots import points_of
-from machines.sheet.quantity import QuantityKind, WrongFigureError, read_quantity
+from machines.sheet.quantity import QuantityKind, WrongFigureError, angles_of, read_quantity
 from machines.sheet.touched import AGREE, apart_by, strange_turns, untold, wrong_sign
 from machines.toml_lines import KeyPath, own_copy
 from machines.user_file import UserFile, ValueSource, read_toml, validate, wrong_keys
@@ -265,6 +265,8 @@ def _travel(making: _Making, letter: str, axis: AxisSheet, rotary: bool) -> tupl
             return None
         return _round(ends[0]), _round(ends[1])
     if rotary:
+        if (both := angles_of(axis.travel)) is not None:  # "-35 to 120 deg" as brochures print it
+            return both
         making.fault(path, f"{letter}.travel: {axis.travel!r} is one figure", 'write both ends, ["-35 deg", "120 deg"], or '
                      '"endless"')
         return None

@@ -170,7 +170,7 @@ _KLARTEXT = [
         r"CYCL DEF 9.0 DWELL TIME\n\1\n",
         "(CYCL DEF 9.1 DWELL 0.5)",
     ),
-    of("gcode.syntax", HEIDENHAIN, "", "ROUND R5\n", "", "allowed are L, C"),
+    of("gcode.syntax", HEIDENHAIN, "", "LINE X5\n", "", "allowed are L, C"),
     of("gcode.mode", HEIDENHAIN, "", "PLANE RESET MOVE\n", r"\1\n", "(PLANE RESET STAY)", machine="mikron-ucp710"),
 ]
 _ASK = [

@@ -17,6 +17,7 @@ from toolpaths.pattern import pattern
 
 CONTOUR = "write the contour with the end points of its lines and arcs, as a CAM system does"
 POINTS = "write the points as they are meant, without the frame"
+SMOOTHING = 'name it with the mm that it may take in [smoothing_words] of the controller file: "G61.1,K3" = 0.003'
 FIGURES = ("put the figures into the program: what the control's tables hold is not known here; the datum stands in the "
            "set-up")
 FRAME = "write TRANS, ROT, SCALE or MIRROR in the place of the frame variable"
@@ -29,7 +30,8 @@ _RULES: dict[str, tuple[tuple[str, str, str], ...]] = {
                 (r"(?<![A-Z0-9_$])RNDM?[ \t]*=", "RND or RNDM", CONTOUR), (r"\$P_UIFR", "$P_UIFR", FIGURES),
                 (r"\bFRAME\b|(?<![A-Z0-9_$])C(?:TRANS|ROT|SCALE|MIRROR|FINE)[ \t]*\(|\$P_[A-Z]*FRAME",
                  "a frame variable", FRAME)),
-    "fanuc": ((r",[ \t]*[CRA]", "a chamfer, a rounded corner or an angle behind a comma", CONTOUR),),
+    "fanuc": ((r"G0*61\.\d[ \t]*,", "G61.1 or G61.2 with a word behind a comma", SMOOTHING),
+              (r",[ \t]*[CRA]", "a chamfer, a rounded corner or an angle behind a comma", CONTOUR)),
     "klartext": (*((rf"^[ \t]*\d*[ \t]*(?:{words})", name, hint) for words, name, hint in _CONTOUR_RULES),
                  (r"CYCL DEF 10\b", "cycle 10 (rotation)", POINTS),
                  (r"CYCL DEF (?:11|26)\b", "cycle 11 or 26 (scaling)", POINTS)),
