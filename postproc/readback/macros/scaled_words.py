@@ -1,10 +1,10 @@
-"""Scaled and mirrored points of Fanuc and Haas: G51, G50, G51.1, G50.1, in the coordinates of the program.
+"""Scaled and mirrored points of Fanuc and Haas: G51, G50, G51.1, G50.1, as they lie in the coordinates of the program.
 
 Fanuc B-63682EN, 16 (scaling of each axis): G51 X Y Z P, or I, J, K by axis, about an absolute centre, until G50; negative
-factors mirror; the unit of a factor without a decimal point is a parameter. B-63944EN-2, 6: G51 within G68 in the control's
-own order alone. Haas 96-8000, G51: a centre that is not stated is where the axis stands; X, Y, Z, I, J, K and R are scaled.
-G51.1 X Y Z mirrors about those coordinates, G50.1 with an axis ends it; mirroring one axis of the plane interchanges G2 and
-G3, G41 and G42, and no G28, G30, G52 to G59, G92 stands under it (Siemens, ISO Milling 04.07, 3.2, which has Fanuc's form).
+factors mirror; the unit of a factor without a decimal point is a parameter. Haas 96-8000, G51: a centre that is not stated
+is where the axis stands; X, Y, Z, I, J, K and R are scaled. G51.1 X Y Z mirrors about those coordinates, G50.1 with an axis
+ends it; mirroring one axis of the plane interchanges G2 and G3, G41 and G42, and no G28, G30, G52 to G59, G92 stands under
+it (Siemens, ISO Milling 04.07, 3.2, which has Fanuc's form).
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ _RULES: dict[str, tuple[tuple[str, str, str], ...]] = {
     "fanuc": ((r"G0*61\.\d[ \t]*,", "G61.1 or G61.2 with a word behind a comma", SMOOTHING),
               (r",[ \t]*[CRA]", "a chamfer, a rounded corner or an angle behind a comma", CONTOUR)),
     "klartext": (*((rf"^[ \t]*\d*[ \t]*(?:{words})", name, hint) for words, name, hint in _CONTOUR_RULES),
-                 (r"CYCL DEF 8\b", "cycle 8 (mirror image)", POINTS), (r"CYCL DEF 10\b", "cycle 10 (rotation)", POINTS),
+                 (r"CYCL DEF 10\b", "cycle 10 (rotation)", POINTS),
                  (r"CYCL DEF (?:11|26)\b", "cycle 11 or 26 (scaling)", POINTS)),
 }
 _RULES["haas"] = (*_RULES["fanuc"], (r"G0*10[01](?![.\d])", "G100 or G101 (mirror image)", POINTS),

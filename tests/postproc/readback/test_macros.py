@@ -11,6 +11,7 @@ from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, TNC, executed, fault
 LINUXCNC = "linuxcnc"
 HEAD = "%\nO0001\nG17 G21 G40 G49 G80 G90 G94 G98\nG54\nG0 X0. Y0. Z0.\n"
 SINUMERIK = "G17 G40 G90 G94 G54 G71\nG0 X0 Y0 Z0\n"
+MIRROR = "CYCL DEF 8.0 MIRROR IMAGE\nCYCL DEF 8.1 "
 DRILL = ("CYCL DEF 200 DRILLING Q200=+2 Q201=-20 Q206=+100 Q202=+5 Q210=+0 Q203=+0 Q204=+10 Q211=+0\n")
 
 
@@ -88,7 +89,24 @@ def test_circles_contours_and_holes_run_as_the_same_program_written_out(body: st
     assert words(one) == [pytest.approx(row, abs=1e-9) for row in words(other)]
 
 
+def test_a_mirror_image_of_klartext_is_the_same_program_written_out() -> None:
+    """About the datum in force; DR and the side of the tool turn round where one axis of the plane is mirrored."""
+    for body, plain in (
+            (f"TRANS DATUM AXIS X+10\n{MIRROR}X\nL X+5 Y+3 RL F100\nL IX+2\nCC X+0 Y+0\nC X+7 Y-3 DR+\nL X+0 R0\n"
+             f"{MIRROR}\nL X+1\n",
+             "L X+5 Y+3 RR F100\nL X+3\nCC X+10 Y+0\nC X+3 Y-3 DR-\nL X+10 R0\nL X+11\n"),
+            (f"{MIRROR}X Y\nL X+5 Y+3 F100\nCR X+7 Y+3 R+1 DR-\n", "L X-5 Y-3 F100\nCR X-7 Y-3 R+1 DR-\n")):
+        one, other = (good(TNC, f"BEGIN PGM A MM\nL X+0 Y+0 Z+0 R0 FMAX\n{text}L M30\nEND PGM A MM\n")
+                      for text in (body, plain))
+        assert (one.ccw == other.ccw).all() and (one.compensation == other.compensation).all()
+        np.testing.assert_allclose(words(one), words(other), atol=1e-9)
+
+
 @pytest.mark.parametrize(("control", "text"), [
+    (TNC, MIRROR + "Z\n"), (TNC, MIRROR + "X\nLP PR+10 PA+0 FMAX\n"), (TNC, MIRROR + "X\nTRANS DATUM AXIS X+1\n"),
+    (TNC, MIRROR + "X\nL X+1 F100 M128\n"), (TNC, "L X+1 Y+1 RL F100\n" + MIRROR + "X\n"),
+    (TNC, MIRROR + "X\nCYCL DEF 10.0 ROTATION\nCYCL DEF 10.1 ROT+9\n"),
+    (TNC, MIRROR + "X\nCYCL CALL POS X+1 Y+1 Z+0 FMAX\n"),
     (FANUC, "G51 X0. Y0. P2000\n"), (FANUC, "G51 X0. Y0. Z0. P2.\nG81 X1. Y1. Z-1. R1. F9.\n"), (FANUC, "G51.1 X0.\nG55\n"),
     (FANUC, "G51.1 X0.\nG68 X0. Y0. R9.\n"), (FANUC, "G68 X0. Y0. R9.\nG51.1 X0.\n"), (FANUC, "G51.1 X0.\nG50.1\n"),
     (FANUC, "G51 X0. Y0. Z0. I1. J2. K1.\nG2 X4. Y0. R2. F9.\n"), (FANUC, "G41 D1 G1 X5. F9.\nG51.1 X0.\n"),
