@@ -109,7 +109,8 @@ def _made(file: Path, machine: str, controller: str, options: Options, given: Gi
         SAYS.interrupted = asked.to_go_on()
         raise
     except EOFError:
-        sheet = new_setup(path, m, controller, options, replace(asked.added(given), complete=True), None, False, found, code, progress)
+        ended = replace(asked.added(given), complete=True)
+        sheet = new_setup(path, m, controller, options, ended, None, False, found, code, progress)
     own = tuple(question for question, _ in asked.done if question.kind == "units")
     return replace(sheet, questions=(*own, *sheet.questions)), options
 
