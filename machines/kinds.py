@@ -141,7 +141,7 @@ def _of_file(file: str) -> dict[str, type[KinematicsModel]]:
     found = {kind: model for model in vars(module).values() for kind in _words(model, module.__name__)}
     if not found:
         raise KindFault(f"{file}, named in {FILES}, holds no kind of machine",
-                        'derive a model from KinematicsModel with `kind: Literal["..."]` (machines/README.md)')
+                        'derive a model from KinematicsModel with `kind: Literal["..."]` (docs/how-to/machine-kind.md)')
     return found
 
 

@@ -83,7 +83,7 @@ def needed(machine: Machine) -> Dynamics:
     if (found := dynamics_of(machine)) is None:
         raise DiagnosticError([error("dynamics.missing", f"the machine file of {machine.name} has no masses",
                                      file=machine.file, hint="add [dynamics], with [dynamics.axes.LETTER] for each axis: "
-                                     "mass, force (machines/README.md)")])
+                                     "mass, force (docs/reference/machine-files.md)")])
     return found
 
 

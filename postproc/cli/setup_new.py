@@ -109,7 +109,8 @@ def _made(file: Path, machine: str, controller: str, options: Options, given: Gi
         SAYS.interrupted = asked.to_go_on()
         raise
     except EOFError:
-        sheet = new_setup(path, m, controller, options, asked.added(given), None, False, found, code, progress)
+        ended = replace(asked.added(given), complete=True)
+        sheet = new_setup(path, m, controller, options, ended, None, False, found, code, progress)
     own = tuple(question for question, _ in asked.done if question.kind == "units")
     return replace(sheet, questions=(*own, *sheet.questions)), options
 
@@ -151,6 +152,8 @@ class _Asking:
 
         result = given
         for question, value in self.done:
+            if value == "":
+                continue  # known by nobody: open still
             if question.name:
                 result = replace(result, tool_number={**result.tool_number, question.name: int(float(value))})
             elif question.kind == "units":

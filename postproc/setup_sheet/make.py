@@ -132,7 +132,7 @@ def _made(toolpath: Toolpath, machine: Machine, controller: str | Path, options:
         return SetupSheet("", (*known, *facts.refused), facts)
     questions = [*asked, *questions_of(facts)]
     answers, left = answered(questions[len(asked):], given, ask, assume)
-    questions = [one for one in questions if ask is not None or not one.optional]
+    questions = [one for one in questions if ask is not None or given.complete or not one.optional]
     left = [*unnumbered, *left]
     known += _unused(given, facts, toolpath)
     for tool in () if facts.lengths or reach else facts.tools:  # not needed, but given: travel is checked with it

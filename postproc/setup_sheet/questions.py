@@ -109,6 +109,9 @@ class GivenAnswers:
     origin: tuple[float, float, float] | None = None
     """mm, where the origin of the CL file's absolute frame stands in the table frame; None: a place is looked for"""
 
+    complete: bool = False
+    """nobody answers any more: questions whose answer may be left empty are open too"""
+
     def of(self, question: Question) -> float | str | None:
         """The answer to a question, None where there is none."""
         if question.name:
@@ -219,6 +222,6 @@ def answered(questions: list[Question], given: GivenAnswers, ask: Callable[[Ques
             result[question.key] = Answer(question.assumed, "assumed")
         elif ask is not None and (said := ask(question)) != "":
             result[question.key] = Answer(said, "answered")
-        elif not question.optional:
+        elif not question.optional or given.complete:
             left.append(question)
     return result, left

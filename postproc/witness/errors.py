@@ -1,6 +1,6 @@
 """A serial machine with its geometric errors, from the error model file: products of 4 x 4 matrices.
 
-Written from the description of the file (`machines/geometric_error/README.md`). Oueslati 2004, 1.1 to 1.20: with M the
+Written from the description of the file (`docs/reference/error-models.md`). Oueslati 2004, 1.1 to 1.20: with M the
 nominal motion of an axis, L the error of its line, E its component errors as they stand at its position,
 
     T = E L M L^-1 (turning axes whose errors are in the directions of the part's side), T = L M L^-1 E (all others).

@@ -104,7 +104,7 @@ def logged(file: str, controller: str) -> None:
 
 def tables() -> dict[str, str]:
     """The CSV tables that the page of error models shows, by the names in their first lines."""
-    text = (PACKAGE / "geometric_error/README.md").read_text("utf-8")
+    text = (ROOT / "docs/reference/error-models.md").read_text("utf-8")
     return dict(re.findall(r"```csv\n# (\S+\.csv)\n(.*?)\n```", text, re.DOTALL))
 
 
@@ -200,7 +200,9 @@ def stages() -> dict[str, Stage]:
         "machines/sheet/README.md": Stage(files={"shop.toml": ""}),
         "machines/calibration/README.md": Stage(copies={
             f"samples/{name}": f"samples/{name}" for name in ("calibration", "tool_axis_tour.apt", "tools.setup.toml")}),
-        "machines/geometric_error/README.md": Stage(
+        "machines/geometric_error/README.md": Stage(copies={"errors.toml": "samples/errors/mikron-ucp710.toml", **{
+            one.name: f"samples/errors/{one.name}" for one in sorted((SAMPLES / "errors").glob("*.csv"))}}, names=_arrays),
+        "docs/reference/error-models.md": Stage(
             files={"x.comp": "-100 -100.002 -100.001\n0 0 0.001\n100 100.003 100.004\n",
                    "y.csv": "Y [mm],EYY [um],EXY [um]\n-200,0,1\n200,4,2\n",
                    **{name: f"{head}\n" for name, head in tables().items()}},

@@ -1,6 +1,6 @@
 """Creo's indexed parts: where points stand while ROTATE or TRANS are in force, and what a file may not contradict.
 
-The evidence is in the README of this folder, "Creo indexing".
+The evidence is in docs/reference/cl-records.md, "Creo indexing".
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import stat
 import sys
 from collections.abc import Callable
 from unicodedata import category
@@ -51,12 +53,26 @@ def answer_line(question: str) -> str:
         EOFError: where it has ended, is closed, or cannot be read.
     """
     SAYS.still()
-    sys.stderr.write(readable(question))
-    sys.stderr.flush()
+    waits = _waits()
+    if waits:
+        sys.stderr.write(readable(question))
+        sys.stderr.flush()
     try:
         line = sys.stdin.readline() if sys.stdin is not None else ""
     except OSError:
         line = ""
+    if line and not waits:
+        sys.stderr.write(readable(question))
     if not line:
+        sys.stderr.write("\n" * waits)
         raise EOFError
     return line
+
+
+def _waits() -> bool:
+    """True where standard input may wait for the question: not a file, the null device, or closed."""
+    try:
+        kind = os.fstat(sys.stdin.fileno()).st_mode if sys.stdin is not None else stat.S_IFREG
+    except (OSError, ValueError):
+        return True
+    return sys.stdin is not None and (sys.stdin.isatty() or not (stat.S_ISCHR(kind) or stat.S_ISREG(kind)))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import os
+from pathlib import Path
 
 import pytest
 
@@ -54,3 +56,13 @@ def test_no_bar_moves_while_something_is_asked(rounds: int, monkeypatch: pytest.
     assert "length 0: " in shown.getvalue()
     answer_line("after it: ")
     assert moving[-1] is False
+
+
+def test_nothing_is_asked_where_nobody_can_answer(monkeypatch: pytest.MonkeyPatch,
+                                                   capsys: pytest.CaptureFixture[str]) -> None:
+    """A question on the null device stood in the middle of what was said next."""
+    with Path(os.devnull).open(encoding="utf-8") as nobody:
+        monkeypatch.setattr("sys.stdin", nobody)
+        with pytest.raises(EOFError):
+            answer_line("length: ")
+    assert capsys.readouterr().err == ""

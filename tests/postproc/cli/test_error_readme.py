@@ -1,4 +1,4 @@
-"""Every example of machines/geometric_error/README.md is as it stands there; its commands run in tests/docs."""
+"""Every example of docs/reference/error-models.md and of the room's README as it stands; its commands run in tests/docs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from machines.geometric_error.exchange import survey
 from postproc.cli.app import app
 
 ROOT = Path(__file__).parents[3]
-TEXT = (ROOT / "machines/geometric_error/README.md").read_text(encoding="utf-8")
+PAGES = ("machines/geometric_error/README.md", "docs/reference/error-models.md")
+TEXT = "".join((ROOT / page).read_text("utf-8") for page in PAGES)
 SAMPLES = ROOT / "samples/errors"
 COMMANDS = [line.split("#")[0].strip() for block in re.findall(r"```sh\n(.*?)```", TEXT, re.DOTALL)
             for line in block.splitlines() if line.startswith("postproc")]

@@ -2,7 +2,7 @@
 
 Nothing here is taken from the project's own tables: numbers are worked out from the rule, codes typed from
 the page that stands next to them (the letters are those of `postproc/readback/SHARED.md` and
-`postproc/controllers/README.md`).
+`docs/reference/control-rules.md`).
 """
 
 from __future__ import annotations

@@ -523,3 +523,12 @@ def test_a_gauge_length_below_the_cutter_is_warned_of(tmp_path: Path) -> None:
     for length, count in ((5.0, 1), (75.0, 0)):  # the cutter of the file is 75 mm long
         made = sheet(file, "head-table", "haas-ngc", GivenAnswers(gauge_length={0: length}))
         assert made.text and [d.code for d in made.diagnostics].count("setup.short_tool") == count
+
+
+@pytest.mark.parametrize("stdin", ["", "\n"])
+def test_answers_that_end_leave_open_what_may_be_empty_too(stdin: str, tmp_path: Path) -> None:
+    """From the null device gauge lengths were taken as not known; behind one empty answer it ended with a fault."""
+    words = ["setup", "new", SAMPLES / "pocket.cls", "-m", "mikron-ucp710", "-o", tmp_path / "s.toml"]
+    said = run(*words, stdin=stdin, code=1).stderr
+    assert "--gauge-length 1=MM" in said and "--gauge-length 2=MM" in said and "--yes" in said
+    assert not (tmp_path / "s.toml").exists()

@@ -1,4 +1,4 @@
-"""Haas NGC: each rule of postproc/controllers/README.md in which it differs from Fanuc, on programs made by hand."""
+"""Haas NGC: each rule of docs/reference/control-rules.md in which it differs from Fanuc, on programs made by hand."""
 
 from __future__ import annotations
 

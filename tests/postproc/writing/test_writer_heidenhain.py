@@ -1,4 +1,4 @@
-"""Heidenhain TNC 640, Klartext: each rule of postproc/controllers/README.md, on programs made by hand."""
+"""Heidenhain TNC 640, Klartext: each rule of docs/reference/control-rules.md, on programs made by hand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Siemens 840D sl: each rule of postproc/controllers/README.md that its text has to follow, on programs made by hand."""
+"""Siemens 840D sl: each rule of docs/reference/control-rules.md that its text has to follow, on programs made by hand."""
 
 from __future__ import annotations
 
