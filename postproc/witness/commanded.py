@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -123,3 +124,16 @@ def loads(tool: Array) -> Array:
 def registers_of(c: Commanded, tool: Array) -> Array:
     """(N,) length register in force: one that was named since the tool of that number, `tool` (N,), was loaded, else OWN."""
     return np.where(c.registered >= loads(tool), c.register, OWN)
+
+
+def tools_of(c: Commanded, setup: dict[str, Any]) -> Array:
+    """(N,) number of the tool: of the set-up by its name, else of the file; UNKNOWN where neither is sure.
+
+    Where [tool_numbers] has names that this witness has not read, a tool without a name could be one of them.
+    """
+    asked = {str(name).upper(): int(n) for name, n in (setup.get("tool_numbers") or {}).items()}
+    if not asked:
+        return c.tool
+    own = np.array([asked.get(name, UNKNOWN) for name in c.names] + [UNKNOWN])[c.name]
+    sure = (c.name >= 0) | set(asked).issubset(c.names)
+    return np.asarray(np.where(own != UNKNOWN, own, np.where(sure & (c.tool > 0), c.tool, UNKNOWN)))

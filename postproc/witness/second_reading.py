@@ -11,7 +11,7 @@ import numpy as np
 
 from postproc.witness.clamps import check_clamps, other_limits
 from postproc.witness.clfile import commanded
-from postproc.witness.commanded import LINE, RAPID, Commanded, unit
+from postproc.witness.commanded import LINE, RAPID, Commanded, tools_of, unit
 from postproc.witness.errors import ErrorChain, error_chain
 from postproc.witness.evidence import Aspect, Case, Compared, ExecutedBlocks, Finding, NotCompared, Testimony
 from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged
@@ -19,7 +19,7 @@ from postproc.witness.motion import Walked, check_arcs, check_path
 from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
 from postproc.witness.sides import check_sides
 from postproc.witness.splines import check_curves
-from postproc.witness.states import check_feeds, check_holes, check_states, check_velocities, tools_of, with_spindle
+from postproc.witness.states import check_feeds, check_holes, check_states, check_velocities, with_spindle
 from postproc.witness.stretches import BOTTOM, is_cut, matched, targets_of, turns_of
 from postproc.witness.text import Array
 from postproc.witness.turning import check_turning

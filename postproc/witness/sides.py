@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from postproc.witness.commanded import ARC, LINE, OFF, UNKNOWN, Commanded
+from postproc.witness.commanded import ARC, LINE, OFF, UNKNOWN, Commanded, tools_of
 from postproc.witness.evidence import Case, ExecutedBlocks, Finding
 from postproc.witness.motion import Walked
-from postproc.witness.states import tools_of
 from postproc.witness.text import Array
 
 _NAMES = {OFF: "off", 41: "left of the path", 42: "right of the path"}

@@ -21,6 +21,7 @@ from postproc.witness.commanded import (
     WitnessCycle,
     loads,
     registers_of,
+    tools_of,
 )
 from postproc.witness.evidence import Aspect, Case, Finding, FindingCode, NotCompared
 from postproc.witness.machine import largest_feed, register_beyond
@@ -269,19 +270,6 @@ def _stated_coolant(setup: dict[str, Any]) -> tuple[dict[int, str], str | None]:
     """The set-up's coolant by number of tool, and that of [output]."""
     own = {int(n): t["coolant"] for n, t in (setup.get("tools") or {}).items() if (t or {}).get("coolant")}
     return own, (setup.get("output") or {}).get("coolant")
-
-
-def tools_of(c: Commanded, setup: dict[str, Any]) -> Array:
-    """(N,) number of the tool: of the set-up by its name, else of the file; UNKNOWN where neither is sure.
-
-    Where [tool_numbers] has names that this witness has not read, a tool without a name could be one of them.
-    """
-    asked = {str(name).upper(): int(n) for name, n in (setup.get("tool_numbers") or {}).items()}
-    if not asked:
-        return c.tool
-    own = np.array([asked.get(name, UNKNOWN) for name in c.names] + [UNKNOWN])[c.name]
-    sure = (c.name >= 0) | set(asked).issubset(c.names)
-    return np.asarray(np.where(own != UNKNOWN, own, np.where(sure & (c.tool > 0), c.tool, UNKNOWN)))
 
 
 def check_holes(w: Walked, c: Commanded, case: Case, match: Array, most: float) -> tuple[list[Finding], int]:

@@ -13,8 +13,7 @@ from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile
 from postproc.verification.second_witness import second_witness
 from postproc.witness.clfile import commanded
-from postproc.witness.commanded import OWN, registers_of
-from postproc.witness.states import tools_of
+from postproc.witness.commanded import OWN, registers_of, tools_of
 from toolpaths.cl.build import ToolpathBuilder
 
 BARE = b"PARTNO bare\nFEDRAT/500\nGOTO/-10,5,30\nGOTO/-10,5,0\nGOTO/10,5,0\nGOTO/10,5,30\nFINI\n"
