@@ -272,12 +272,17 @@ def _place_assumed(fit: Fit) -> Diagnostic:
                    f"in [part], and take `{ORIGIN}` out of `assumed`")
 
 
+_SHORTER = "shorter tools, "
+_ELSE = f"a machine with more travel, {_SHORTER}or a file for each side of the part"
+"""what serves where no place fits; no tool is shorter than one of 0 mm"""
+
+
 def _not_fitted(fit: Fit) -> list[Diagnostic]:
     """Why no place fits, next to what stands against the first."""
     errors = [d for d in fit.result.diagnostics if d.severity is Severity.ERROR]
     said = [info("place.found", f"{fit.tried} place{'s' * (fit.tried > 1)} tried, none is possible"
                  + "".join(f"; {why}" for why in fit.lacks[:3]),
-                 hint="a machine with more travel, shorter tools, or a file for each side of the part")]
+                 hint=_ELSE if any(tool.gauge_length for tool in fit.setup.tools.values()) else _ELSE.replace(_SHORTER, ""))]
     said = said if fit.tried > 1 or fit.lacks else []
     if fit.place is not None and fit.place.stated:
         said = found_place(fit.result, fit.result.toolpath)

@@ -156,7 +156,8 @@ def _depth(b: ToolpathBuilder, v: CycleValues) -> float:
                     "write it with DEPTH or FEDTO")
     elif depth < 0.0:
         b.log.error("cl.cycle-depth", f"CYCLE/{v.kind}: the depth {v.depth:g} points away from the part", b.line,
-                    f"{b.dialect.title} writes depths {'negative' if b.dialect.depth_sign < 0 else 'positive'}")
+                    f"{b.dialect.title} writes depths {'negative' if b.dialect.depth_sign < 0 else 'positive'}; where the "
+                    "file is of another system, name it (--dialect)")
     elif depth == 0.0:
         b.log.error("cl.cycle-depth", f"CYCLE/{v.kind}: a hole of depth 0", b.line, "state the depth of the hole in the CAM "
                     "system (FEDTO or DEPTH of the CYCLE record), or take the hole out of the operation")

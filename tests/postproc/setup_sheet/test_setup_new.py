@@ -525,6 +525,7 @@ def test_a_gauge_length_below_the_cutter_is_warned_of(tmp_path: Path) -> None:
         assert made.text and [d.code for d in made.diagnostics].count("setup.short_tool") == count
 
 
+
 @pytest.mark.parametrize("stdin", ["", "\n"])
 def test_answers_that_end_leave_open_what_may_be_empty_too(stdin: str, tmp_path: Path) -> None:
     """From the null device gauge lengths were taken as not known; behind one empty answer it ended with a fault."""
@@ -532,3 +533,13 @@ def test_answers_that_end_leave_open_what_may_be_empty_too(stdin: str, tmp_path:
     said = run(*words, stdin=stdin, code=1).stderr
     assert "--gauge-length 1=MM" in said and "--gauge-length 2=MM" in said and "--yes" in said
     assert not (tmp_path / "s.toml").exists()
+
+
+@pytest.mark.parametrize(("given", "advised"), [((), False), (("--gauge-length", "1=80"), True)])
+def test_shorter_tools_are_advised_where_one_has_a_length(given: tuple[str, ...], advised: bool, tmp_path: Path) -> None:
+    part = tmp_path / "far.apt"
+    part.write_text("UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nFEDRAT/MMPM,600\nRAPID\nGOTO/-390,0,50\nGOTO/-390,0,0\n"
+                    "GOTO/390,0,0\nRAPID\nGOTO/390,0,50\nFINI\n")
+    said = run("setup", "new", part, "-m", "haas-umc-750", "-c", "haas-ngc", "--yes", "-o", tmp_path / "s.toml", *given,
+               code=1).output
+    assert "a machine with more travel" in said and ("shorter tools, or a file" in said) == advised

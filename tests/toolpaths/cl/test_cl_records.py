@@ -275,3 +275,13 @@ def test_what_cannot_be_written_is_refused() -> None:
     vectors = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
     with pytest.raises(ValueError, match="both"):
         toolpaths.write(replace(p, normal=vectors, contact=vectors))
+
+
+@pytest.mark.parametrize(("system", "title"), [
+    ("CAMWorks 2023", "SolidWorks CAM .apt"), ("CATIA V5", "CATIA"), ("", "CATIA")])
+def test_a_depth_that_points_away_is_answered_in_the_words_of_the_file(system: str, title: str) -> None:
+    """TOOLNO is a word of ISO 4343: it says CATIA where the file names no other system."""
+    said = read_bytes(f"PPRINT/{system}\nUNITS/MM\nTOOLNO/1,MILL,10\nLOADTL/1\nRAPID\nGOTO/0,0,50\n"
+                                "CYCLE/DRILL,DEPTH,-5,MMPM,60,CLEAR,3\nGOTO/5,5,0\nCYCLE/OFF\nFINI\n".encode()).diagnostics
+    [hint] = [d.hint for d in said if d.code == "cl.cycle-depth"]
+    assert hint.startswith(f"{title} writes depths positive"), hint

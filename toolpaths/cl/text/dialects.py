@@ -107,7 +107,8 @@ _MAJORS: tuple[tuple[DialectName, tuple[str, ...]], ...] = (
     ("creo", ("CAMERA", "PPWORD")),
 )
 _TEXTS: tuple[tuple[DialectName, str], ...] = (("makino", "MAKINO-FF"), ("surfcam", "SURFCAM INC"), ("makino", "FF/CAM"),
-          ("catia", "CATIA"), ("catia", "TOOLCHANGEBEGINNING"), ("nx", "CENTERLINE DATA"),
+          ("catia", "CATIA"), ("solidworks", "CAMWORKS"),
+          ("catia", "TOOLCHANGEBEGINNING"), ("nx", "CENTERLINE DATA"),
           ("ncl", "NCL"), ("ncl", "NCLCAM"), ("creo", "PRO/NC"), ("creo", "PRO/CLFILE"), ("creo", "CREO"))
 _NAMED = ("makino", "surfcam")
 """systems that write words of others, and their own name in each file"""
@@ -132,12 +133,13 @@ def detect(program: StatementList) -> tuple[Dialect, str]:
     if text is not None and text[0] in _NAMED:
         return DIALECTS[text[0]], text[1]
     other = None if text is not None else _by_text(program, tuple(("generic", name) for name in _OTHERS))
+    named = other is not None or (text is not None and text[0] != "catia")
     sense_word = _clockwise_word(program)
     if sense_word:
         return DIALECTS["solidworks-clt"], f"CIRCLE with a sense word in line {sense_word}"
     for name, words in _MAJORS:
         for word in words:
-            if word in majors and (other is None or word not in _STANDARD):
+            if word in majors and not (named and word in _STANDARD):
                 return DIALECTS[name], f"{word} in line {majors[word]}"
     for major, line in majors.items():
         if major.startswith(DATA_COMMENT):
