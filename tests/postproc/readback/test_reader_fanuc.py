@@ -143,7 +143,7 @@ def test_subprograms_of_other_files() -> None:
 
 
 def test_a_fault_in_another_file_points_there() -> None:
-    others = {"O77.nc": b"%\nO0077\nG2 X1. R.1 F9\nM99\n%\n", "O78.nc": b"%\nO78\nG51 X1.\nM99\n%\n"}
+    others = {"O77.nc": b"%\nO0077\nG2 X1. R.1 F9\nM99\n%\n", "O78.nc": b"%\nO78\nG999 X1.\nM99\n%\n"}
     _, found = executed(FANUC, program("G0 X0. Y0. Z0.\nM98 P77\n"), others=others)
     assert [(d.code, d.file, list(d.lines)) for d in found] == [("gcode.arc", "O77.nc", [3])], "O78 is not called"
     _, found = executed(FANUC, program("G0 X0. Y0. Z0.\nM98 P78\n"), others=others)
