@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import field, replace
 from pathlib import Path
 
@@ -170,7 +170,7 @@ def _made(file: UserFile, sheet: DataSheet, name: str) -> NewMachine:
         return NewMachine(None, "", faults)
     machine = assemble(whole, model)
     odd = [file.problem(p.code, p.path, p.message, p.hint) for p in against_distances(machine, sheet)]
-    found = [*faults, *_by_cause(as_warnings(whole, machine)), *(replace(one, severity=Severity.WARNING) for one in odd)]
+    found = [*faults, *as_warnings(whole, machine), *(replace(one, severity=Severity.WARNING) for one in odd)]
     text = machine_text(making.figures, Path(file.file).name)
     return NewMachine(machine, text, found, () if sheet.touched else sheet.rotary)
 
@@ -179,15 +179,7 @@ def _odd_besides(making: _Making, sheet: DataSheet) -> list[Diagnostic]:
     """Figures that no machine has, next to the faults of a sheet. In the place of figures that could not be read stand usual
     ones, small and large: what is said with both has nothing to do with them."""
     found = [_odd_with(making, sheet, slide, fast) for slide, fast in (([-500.0, 0.0], 500.0), ([-3000.0, 3000.0], 200.0))]
-    return _by_cause(one for one in found[0] if one in found[1])
-
-
-def _by_cause(found: Iterable[Diagnostic]) -> list[Diagnostic]:
-    """Axes through one pivot of the sheet are wrong by one figure: what is said of the second one is left out."""
-    known: dict[tuple[object, ...], Diagnostic] = {}
-    for one in found:
-        known.setdefault((one.code, one.lines, one.message.partition(" turns about ")[2] or one.message), one)
-    return list(known.values())
+    return [one for one in found[0] if one in found[1]]
 
 
 def _odd_with(making: _Making, sheet: DataSheet, slide: FileValue, fast: float) -> list[Diagnostic]:
