@@ -26,6 +26,11 @@ NOTHING = "nothing is to be done"
 """how a hint begins that only says what was taken and why that is right: no remedy"""
 
 
+FEW_PLACES = {"report.GRID": (3, 3, 3, 2), "report.COARSE": (2, 2, 2, 2), "extremes.MOST": 20, "extremes.START": 20,
+              "transmission.ROUNDS": 2}
+"""where a machine is analysed"""
+
+
 def remedies(hints: list[str]) -> list[str]:
     """Hints that ask for something."""
     return [hint for hint in hints if hint not in VERDICTS and not hint.startswith((NOTHING, REPORT))]
@@ -39,6 +44,8 @@ def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(conversion, "BAND_UP_TO", 0)
     for name in ("MOST", "FEW"):
         monkeypatch.setattr(f"machines.analysis.certify.{name}", 500)
+    for name, value in FEW_PLACES.items():
+        monkeypatch.setattr(f"machines.analysis.{name}", value)
     for name, value in (("RESTARTS", 1), ("ROUNDS", 12), ("CROWD", 6), ("GRID", (3, 3, 2))):
         monkeypatch.setattr(layouts, name, value)
 
