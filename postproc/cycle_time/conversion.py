@@ -109,7 +109,7 @@ def estimate_of(result: PostResult, model: str = "", executed: bool = False) -> 
 
 
 @dataclass(frozen=True)
-class Sampled:
+class HeldTimes:
     """Times by formulas, those of turning axes by what the executed control takes of them.
 
     Attributes:
@@ -121,7 +121,7 @@ class Sampled:
     off: float | None
 
 
-def sampled(blocks: MotionBlocks, model: CycleTimeModel) -> Sampled:
+def sampled(blocks: MotionBlocks, model: CycleTimeModel) -> HeldTimes:
     """The times of a program by formulas, held against the control where axes turn; not where few do, where the program is
     short, and where no motion is found.
 
@@ -130,22 +130,22 @@ def sampled(blocks: MotionBlocks, model: CycleTimeModel) -> Sampled:
     """
     made = timed(blocks, model.quick())
     if model.kind != "control" or len(blocks) < FEWEST:
-        return Sampled(made, None)
+        return HeldTimes(made, None)
     turning = kinds(blocks, made) == TURNING
     along = np.cumsum(np.where(turning, made.seconds, 0.0))
     if along[-1] < LEAST_SHARE * float(made.seconds.sum()):
-        return Sampled(made, None)
+        return HeldTimes(made, None)
     middle = np.searchsorted(along, (np.arange(STRETCHES) + 0.5) / STRETCHES * along[-1])
     pairs = [_pair(blocks, turning, model, max(int(k) - LONG // 2, 0)) for k in middle]
     if any(pair is None for pair in pairs):
-        return Sampled(made, None)
+        return HeldTimes(made, None)
     executed, about = np.array(pairs, dtype=np.float64).T
     factor = float(executed.sum() / about.sum())
     scatter = float(np.linalg.norm(executed - factor * about)) * (STRETCHES / (STRETCHES - 1.0))**0.5 / float(about.sum())
     share = time_by_kind(blocks, made) / max(float(made.seconds.sum()), 1e-9)
     others = float(sum(share[k] * BY_FORMULAS[name] for k, name in enumerate(KINDS) if k != TURNING))
     off = float(np.hypot(others, share[TURNING] * max(STUDENT * scatter / factor, LEAST_OFF)))
-    return Sampled(_scaled(made, blocks, np.where(turning, factor, 1.0)), off)
+    return HeldTimes(_scaled(made, blocks, np.where(turning, factor, 1.0)), off)
 
 
 def _pair(blocks: MotionBlocks, turning: Bools, model: CycleTimeModel, low: int) -> tuple[float, float] | None:
