@@ -174,6 +174,7 @@ def test_programs_that_cannot_be_followed(body: str, code: str) -> None:
 
 
 @pytest.mark.parametrize(("block", "code"), [
+    ("G51 X0. P2000", "gcode.decimal_point"), ("G51 X0. Y0.", "gcode.mode"),
     ("G10 L3 P1 R1.", "gcode.data_setting"),
     ("#1=#500", "gcode.variable"), ("#3000=1", "gcode.alarm"), ("G43.5 H1", "gcode.unknown_code"),
     ("G76 X0. Z-1. R1. Q.1", "gcode.unknown_code"), ("G87 X0.", "gcode.unknown_code"), ("#1=1/0", "gcode.expression"),
