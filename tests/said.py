@@ -3,7 +3,7 @@
     pytest --said FILE ...                 adds all that those tests were told to FILE
     python tests/said.py FILE              takes the codes without another example from it into tests/said.toml
 
-A test that is named there must be told the same again, figures apart, as often as it runs.
+A test that is named there must be told the same again, figures apart, whenever it is told anything by that code.
 """
 
 from __future__ import annotations
@@ -151,8 +151,8 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
 
 
 def missing(must: dict[str, str], heard: dict[str, set[str]]) -> dict[str, str]:
-    """What must have been heard and was not, figures apart, by code."""
-    return {code: text for code, text in must.items() if _alike(text) not in heard.get(code, ())}
+    """What was heard otherwise than it must be, figures apart, by code; what tests share is told to the first alone."""
+    return {code: text for code, text in must.items() if code in heard and _alike(text) not in heard[code]}
 
 
 def _best(some: list[Said]) -> Said | None:

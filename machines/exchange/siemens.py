@@ -35,6 +35,9 @@ _FIGURES = {"velocity": ("MA_MAX_AX_VELO", "", 1.0 / 60.0, 360.0 / 60.0),
 """key: machine datum, index before the axis (DYNNORM), to mm and to degrees per s, s2, s3"""
 _BETWEEN = 1e-6
 """mm, or of a unit vector: by how much TRAORI and a swivel data record may differ"""
+_CLOSES = 0.01
+"""mm that the vector which closes a chain may be off by"""
+_VECTORS = "see to the signs of all vectors: where the machine keeps its coordinates their sum is 0"
 _HINT = "state it: --set \"kinematics.structure=w A' b X Y Z (C1) t\" --set kinematics.axes.A.point=[0,0,0]"
 
 
@@ -151,17 +154,36 @@ class _SiemensMachine:
             if not any(vectors[0]):
                 self.draft.error("import.geometry", f"{datum.said}, and no $MC_TRAFO5_AXIS1_{n}", datum.line, _HINT)
             return None
-        points = _points(carried, base, joint)
+        self._closes(carried, base, joint, n)
+        letters = self._letters(self._entering(n), vectors)
+        return SwivelGeometry(carried, vectors, _points(carried, base, joint), letters, datum)
+
+    def _entering(self, n: str) -> list[str]:
+        """Letters of the rotary axes that go into the transformation, "" where the file does not name them."""
         numbers = [self.data.number(f"MC_TRAFO_AXES_IN_{n}", str(3 + k), 0.0) for k in (0, 1)]
         names = [self.data.get("MC_AXCONF_CHANAX_NAME_TAB", str(round(number) - 1)) for number in numbers]
-        letters = [_letter(name.text) if name else "" for name in names]
-        return SwivelGeometry(carried, vectors, points, self._letters(letters, vectors), datum)
+        return [_letter(name.text) if name else "" for name in names]
+
+    def _closes(self, carried: Carried, base: list[float], joint: list[float], n: str) -> None:
+        """MD24500 is what is left of the vectors of the axes; where it is not, one of them is wrong."""
+        part, datum = self._vector(f"MC_TRAFO5_PART_OFFSET_{n}"), self.data.vector(f"MC_TRAFO5_PART_OFFSET_{n}")[1]
+        would = [0.0 - b - (0.0 if carried == "M" else a) for a, b in zip(base, joint, strict=True)]
+        if datum is not None and any(part) and not np.allclose(part, would, atol=_CLOSES):
+            self.draft.warning("import.contradiction", f"$MC_TRAFO5_PART_OFFSET_{n} = {part} closes the chain and would be "
+                               f"{would}: the lines of the axes are taken from the vectors before it", datum.line, _VECTORS)
 
     def _of_older_type(self, datum: MachineDatum, carried: Carried, letters: str, n: str) -> SwivelGeometry | None:
         """Axes along X, Y, Z by their letters; in which direction they count is not documented, so it is said."""
         if not self._plain(n):
             return None
-        points = _points(carried, self._vector(f"MC_TRAFO5_BASE_TOOL_{n}"), self._joint(carried, n))
+        named = self._entering(n)
+        if any(name in ROTARY and name != letter for name, letter in zip(named, letters, strict=True)):
+            self.draft.error("import.geometry", f"{datum.said} is of axes {' and '.join(letters)}, $MC_TRAFO_AXES_IN_{n} "
+                             f"names {' and '.join(named)}", datum.line, _HINT)
+            return None
+        base, joint = self._vector(f"MC_TRAFO5_BASE_TOOL_{n}"), self._joint(carried, n)
+        self._closes(carried, base, joint, n)
+        points = _points(carried, base, joint)
         sense = -1.0 if carried == "P" else 1.0
         first, second = ([sense * float(letter == axis) for axis in "ABC"] for letter in letters)
         self.draft.info("import.sense", f"{datum.said}: {letters[0]} and {letters[1]} are taken to turn the tool relative "

@@ -10,14 +10,14 @@ from pathlib import Path
 from machines.figures import ASSUMED, SOURCE
 from machines.loader import as_warnings, assemble, check
 from machines.machine import Machine
-from machines.plausible import implausible, odd_limits
+from machines.plausible import implausible
 from machines.sheet.distances import against_distances, distances
 from machines.sheet.file_text import FileValue, machine_text, nested
 from machines.sheet.jog import sense
 from machines.sheet.model import AxisSheet, DataSheet, TouchedSheet
 from machines.sheet.pivot_text import read_pivots
 from machines.sheet.pivots import points_of
-from machines.sheet.quantity import QuantityKind, WrongFigureError, read_quantity
+from machines.sheet.quantity import QuantityKind, WrongFigureError, angles_of, read_quantity
 from machines.sheet.touched import AGREE, apart_by, strange_turns, untold, wrong_sign
 from machines.toml_lines import KeyPath, own_copy
 from machines.user_file import UserFile, ValueSource, read_toml, validate, wrong_keys
@@ -176,28 +176,28 @@ def _made(file: UserFile, sheet: DataSheet, name: str) -> NewMachine:
 
 
 def _odd_besides(making: _Making, sheet: DataSheet) -> list[Diagnostic]:
-    """Figures that no machine has, next to the faults of a sheet; where an axis could not be read, nothing is compared with
-    it: it stands there as a usual one."""
-    known = {path[1] for path in making.figures if path[0] == "axes" and path[2:] == ("velocity",)}
-    missing = [letter for letter in sheet.axes if letter not in known]
+    """Figures that no machine has, next to the faults of a sheet. In the place of figures that could not be read stand usual
+    ones, small and large: what is said with both has nothing to do with them."""
+    found = [_odd_with(making, sheet, slide, fast) for slide, fast in (([-500.0, 0.0], 500.0), ([-3000.0, 3000.0], 200.0))]
+    return [one for one in found[0] if one in found[1]]
+
+
+def _odd_with(making: _Making, sheet: DataSheet, slide: FileValue, fast: float) -> list[Diagnostic]:
+    """The same with these figures of a slide, mm and mm/s, where there are none."""
     figures = dict(making.figures)
-    for letter in missing:
-        figures |= {("axes", letter, *key): value for key, value in _usual(letter in sheet.rotary).items()}
+    for letter in sheet.axes:
+        rotary = letter in sheet.rotary
+        acceleration = _TURNING_ACCELERATION if rotary else _ACCELERATION
+        usual: dict[str, FileValue] = {"travel": [-100.0, 100.0] if rotary else slide, "velocity": 100.0 if rotary else fast,
+                                       "acceleration": acceleration, "jerk": _JERK * acceleration, "home": 0.0}
+        for key, value in usual.items():
+            figures.setdefault(("axes", letter, key), value)
     whole = UserFile(making.file.name, making.file.file, nested(figures), making.origins)
     model, faults = check(whole)
     if model is None or has_errors(faults):
         return [d for d in faults if d.code in ("file.range", "file.value")]
-    machine = assemble(whole, model)
-    odd = list(odd_limits(machine) if missing else implausible(machine))
+    odd = implausible(assemble(whole, model))
     return [replace(whole.problem(p.code, p.path, p.message, p.hint), severity=Severity.WARNING) for p in odd]
-
-
-def _usual(rotary: bool) -> dict[KeyPath, FileValue]:
-    """Figures of an axis of which nothing is known, to look at those of the others."""
-    acceleration = _TURNING_ACCELERATION if rotary else _ACCELERATION
-    values: dict[str, FileValue] = {"travel": [-100.0, 100.0] if rotary else [-500.0, 0.0], "acceleration": acceleration,
-                                    "velocity": 100.0 if rotary else 500.0, "jerk": _JERK * acceleration, "home": 0.0}
-    return {(key,): value for key, value in values.items()}
 
 
 def _header(making: _Making, sheet: DataSheet) -> None:
@@ -219,12 +219,12 @@ def _axis(making: _Making, letter: str, axis: AxisSheet, rotary: bool) -> None:
     """Travel, speed, home of one axis, and what is assumed of it."""
     travel = _travel(making, letter, axis, rotary)
     rapid = making.read((letter, "rapid"), axis.rapid, "turning speed" if rotary else "speed")
-    if travel is None or rapid is None:
-        return
     at = ("axes", letter)
-    ends = "unlimited" if travel == (-math.inf, math.inf) else list(travel)
-    making.stated((*at, "travel"), ends, (letter, "travel"), f"{letter} travel")
-    making.stated((*at, "velocity"), _round(rapid), (letter, "rapid"), f"{letter} rapid")
+    if travel is not None:
+        ends = "unlimited" if travel == (-math.inf, math.inf) else list(travel)
+        making.stated((*at, "travel"), ends, (letter, "travel"), f"{letter} travel")
+    if rapid is not None:
+        making.stated((*at, "velocity"), _round(rapid), (letter, "rapid"), f"{letter} rapid")
     acceleration = _TURNING_ACCELERATION if rotary else _ACCELERATION
     if axis.acceleration:
         read = making.read((letter, "acceleration"), axis.acceleration, "turning acceleration" if rotary else "acceleration")
@@ -236,7 +236,7 @@ def _axis(making: _Making, letter: str, axis: AxisSheet, rotary: bool) -> None:
     if axis.home:
         home = making.read((letter, "home"), axis.home, "angle" if rotary else "length")
         making.stated((*at, "home"), _round(home or 0.0), (letter, "home"), f"{letter} home")
-    else:
+    elif travel is not None:
         making.assume((*at, "home"), min(max(0.0, travel[0]), travel[1]), (letter,))
 
 
@@ -265,6 +265,8 @@ def _travel(making: _Making, letter: str, axis: AxisSheet, rotary: bool) -> tupl
             return None
         return _round(ends[0]), _round(ends[1])
     if rotary:
+        if (both := angles_of(axis.travel)) is not None:  # "-35 to 120 deg" as brochures print it
+            return both
         making.fault(path, f"{letter}.travel: {axis.travel!r} is one figure", 'write both ends, ["-35 deg", "120 deg"], or '
                      '"endless"')
         return None

@@ -15,10 +15,13 @@ Jog = Literal["right up", "right down", "front up", "front down", "clockwise", "
 _SPELLINGS = {"counterclockwise": "anti-clockwise", "counter-clockwise": "anti-clockwise", "anticlockwise": "anti-clockwise",
               "ccw": "anti-clockwise", "cw": "clockwise"}
 
+_PASSED_OVER = ("the", "side", "edge", "goes", "moves", "turns", "to")
+"""words of the questions that an answer may repeat"""
+
 
 def spelt(text: str) -> str:
     """A jog in other spellings as the word that it stands for."""
-    words = " ".join(text.lower().split())
+    words = " ".join(word for word in text.lower().split() if word not in _PASSED_OVER)
     return _SPELLINGS.get(words, words)
 
 

@@ -13,6 +13,7 @@ _SIEMENS = re.compile(rf"(?:N\d+\s*)?\$TC_CARR\d+\[(?P<carrier>\d+)\]\s*=\s*(?P<
 _HEAD: dict[PivotForm, re.Pattern[str]] = {
     "fanuc": re.compile(r"N(\d{5})(?!\d)"), "siemens": re.compile(r"(?:N\d+\s*)?\$TC_CARR(\d+)")}
 """how a line begins that sets a number"""
+_COMMENT, _NEXT = re.compile(r"\([^)]*\)?|;.*"), re.compile(r"(?<=\S)\s+(?=\$TC_)")
 _WORD = re.compile(rf"([A-Z])({_NUMBER})")
 _OWNER: dict[PivotForm, str] = {"fanuc": "paths", "siemens": "carriers"}
 """of which a control has several, each with numbers of its own: L of a list of parameters, the index of $TC_CARR"""
@@ -27,7 +28,7 @@ def read_pivots(form: PivotForm, text: str) -> tuple[dict[str, tuple[float, floa
         return {}, [f"the text of a {form} control is not read: write `points`"]
     known, wrong, owners = dict[int, float](), list[str](), set[str]()
     numbers = {first + k for first in _FIRST[form] for k in range(3)}
-    for line in filter(None, (one.strip().upper() for one in text.splitlines())):
+    for line in _settings(text):
         number, owner, value = _assigned(form, line)
         if number not in numbers:
             continue
@@ -45,6 +46,12 @@ def read_pivots(form: PivotForm, text: str) -> tuple[dict[str, tuple[float, floa
     if wrong or missing:
         return {}, wrong or [f"{_word(form, number)} is missing, {what}" for number, what in missing]
     return {name: (known[first], known[first + 1], known[first + 2]) for first, name in given.items()}, []
+
+
+def _settings(text: str) -> list[str]:
+    """One setting each, without comments, behind ; or in brackets: Siemens has several in a line."""
+    lines = (_COMMENT.sub("", line).strip().upper() for line in text.splitlines())
+    return [part for line in lines for one in _NEXT.split(line) if (part := one.strip())]
 
 
 def _word(form: PivotForm, number: int) -> str:

@@ -16,6 +16,8 @@ VectorNames = tuple[str, ...]
 """names of vectors: each goes from the pivot before it to the next; the last one, in brackets, closes the chain"""
 _PLACES = ("machine", "haas")
 """forms whose numbers are places, not vectors from one axis to the next"""
+_SWIVEL = ("I1", "I2", "I3", "I4")
+"""of which a swivel data set has those at 0 too that its kind of machine does not use"""
 _TWO_TABLES: dict[PivotForm, VectorNames] = {
     "haas": ("MRZP", "MRZP second"), "siemens": ("I2", "I3", "(I4)"), "heidenhain": ("Trans 1", "Trans 2"),
     "fanuc": ("19700", "19703")}
@@ -54,7 +56,8 @@ def points_of(form: PivotForm, table: tuple[str, ...], head: tuple[str, ...],
     """
     chains = names_of(form, table, head)
     wanted = [name.strip("()") for chain in chains for name in chain]
-    wrong = [f"{name} is not a name of {form}: it has {', '.join(wanted)}" for name in given if name not in wanted]
+    wrong = [f"{name} is not a name of {form}: it has {', '.join(wanted)}"
+             for name, vector in given.items() if name not in wanted and (name not in _SWIVEL or any(vector))]
     missing = [name for chain in chains for name in chain if name not in given and "(" not in name and name != "MRZP second"]
     if missing:
         return {}, [*wrong, f"{', '.join(missing)} missing: X, Y and Z in mm"]

@@ -12,9 +12,9 @@ UNITS: dict[QuantityKind, dict[str, float]] = {
     "angle": {"deg": 1.0, "°": 1.0, "degrees": 1.0},
     "speed": {"m/min": 1000.0 / 60.0, "mm/min": 1.0 / 60.0, "mm/s": 1.0, "m/s": 1000.0, "in/min": 25.4 / 60.0,
               "ipm": 25.4 / 60.0, "in/s": 25.4},
-    "turning speed": {"rpm": 6.0, "1/min": 6.0, "rev/min": 6.0, "deg/s": 1.0, "°/s": 1.0, "deg/min": 1.0 / 60.0,
-                      "°/min": 1.0 / 60.0},
-    "acceleration": {"m/s2": 1000.0, "m/s²": 1000.0, "mm/s2": 1.0, "mm/s²": 1.0, "g": _G, "in/s2": 25.4},
+    "turning speed": {"rpm": 6.0, "1/min": 6.0, "min-1": 6.0, "min⁻¹": 6.0, "r/min": 6.0, "rev/min": 6.0, "deg/s": 1.0,
+                      "°/s": 1.0, "deg/sec": 1.0, "°/sec": 1.0, "deg/min": 1.0 / 60.0, "°/min": 1.0 / 60.0},
+    "acceleration": {"m/s2": 1000.0, "m/s²": 1000.0, "m/s^2": 1000.0, "mm/s2": 1.0, "mm/s²": 1.0, "g": _G, "in/s2": 25.4},
     "turning acceleration": {"deg/s2": 1.0, "°/s²": 1.0, "rev/s2": 360.0, "rad/s2": 57.29577951308232},
     "time": {"s": 1.0, "sec": 1.0, "min": 60.0},
 }
@@ -48,7 +48,9 @@ def read_quantity(text: str, measure: QuantityKind) -> float:
     if found is None:
         example = f"12.5 {next(iter(units))}"
         raise WrongFigureError(f"{text!r} is not a number with a unit", f"write {_a(measure)} as in {example!r}")
-    number, unit = found.groups()
+    number, unit = found[1], found[2].lower()
+    if unit.startswith(","):
+        raise WrongFigureError(f"{text!r} has a comma in its number", "write it with a point, thousands without a mark")
     if not unit:
         raise WrongFigureError(f"{text!r} has no unit", f"{_a(measure)} is in {known}")
     if unit not in units:

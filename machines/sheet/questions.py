@@ -95,6 +95,8 @@ def _table_top(sheet: _Sheet) -> list[str]:
         both = text.split(" to ")
         if text and len(both) != 2:
             raise ValueError(f"{text!r} is not two lengths as 102 mm to 610 mm")
+        if text and both[0].strip().replace(".", "", 1).isdigit():  # "102 to 610 mm"
+            both[0] += f" {both[1].strip().lstrip('.0123456789').strip()}"
         for one in both if text else ():
             read_quantity(one, "length")
         return json.dumps([one.strip() for one in both]) if text else ""

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 from toolpaths.table_text import table_text
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from machines.geometric_error.actual.model import ErrorModel
     from machines.geometric_error.exchange.exports import MadeMap, NotOfJoint, Screws
     from toolpaths.diagnostics import Diagnostic
@@ -121,13 +123,16 @@ def screw_figures(model: ErrorModel, screws: Screws, names: dict[str, str], lost
     return {"losses": lost, "worst_tip_um": [before[0], left[0]], "worst_axis_arcsec": [before[1], left[1]]}, noted
 
 
-def screw_warning(names: list[str], file: str, rest: object) -> Diagnostic:
+def screw_notice(names: list[str], file: str, rest: Path | None) -> Diagnostic:
     """That the control now corrects these, and which model the post-processor then takes."""
-    from toolpaths.diagnostics import warning
+    from toolpaths.diagnostics import info, warning
 
-    hint = f"convert with --error-model {rest}" if rest else "write a model of the rest with --rest, and convert with that"
-    return warning("error-export.control", f"LinuxCNC then corrects {', '.join(names)}: the post-processor must not do it "
-                   "again", file=file, hint=hint)
+    corrected = f"LinuxCNC then corrects {', '.join(names)}: the post-processor must not do it again"
+    if rest is None:
+        return warning("error-export.control", corrected, file=file,
+                       hint="write a model of the rest with --rest, and convert with that")
+    return info("error-export.rest", f"{corrected}, {rest.name} holds what is left", file=file,
+                hint=f"convert with --error-model {rest}")
 
 
 def map_figures(model: ErrorModel, made: MadeMap) -> tuple[dict[str, Any], list[str]]:

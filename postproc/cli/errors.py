@@ -105,7 +105,7 @@ def to_linuxcnc(file: ModelFile, machine: MachineName, output: Folder, rest: Res
                        {"the error model": str(file), **own_files(machine)})
     from machines.geometric_error.exchange import exports
     from machines.geometric_error.tables.csv_table import UNITS
-    from postproc.cli.error_text import screw_figures, screw_warning
+    from postproc.cli.error_text import screw_figures, screw_notice
 
     with shown_errors(json):
         m = machine_of(machine)
@@ -118,7 +118,7 @@ def to_linuxcnc(file: ModelFile, machine: MachineName, output: Folder, rest: Res
         adjacent = {} if rest is None else {rest.parent / name: text for name, text in model_files(
             screws.rest, rest.stem, f"{file.name} less what LinuxCNC corrects", rest.name).items()}
     figures, noted = screw_figures(model, screws, names, exports.named(screws.losses), worst, tool_length)
-    found.append(screw_warning(list(figures["losses"]), str(file), rest))
+    found.append(screw_notice(list(figures["losses"]), str(file), rest))
     finish({names[letter]: text for letter, text in screws.texts.items()}, output, [file], json, found,
            [*noted, *exports.notices(screws.held, m), "for the INI file:", *exports.ini_lines(m, names)], figures, adjacent)
 

@@ -83,10 +83,47 @@ def slow_down(s: Floats, cap: Floats, d1: Floats, d2: Floats, d3: Floats, accele
 
 
 @loop
-def braked(s: Floats, v: Floats, k: int, x: float) -> tuple[int, float]:
-    """(interval, speed of the braking curve) at x, looked for from interval k: v^1.5 is linear, as it is at a rest."""
+def left_to_brake(k: int, v: float, a: float, d1: Floats, d2: Floats, d3: Floats, acceleration: Floats, jerk: Floats,
+                  straight: Floats) -> tuple[float, float]:
+    """The lowest acceleration and jerk of `left`, to the last digit."""
+    a_most, j_most = straight[k, 0], straight[k, 1]
+    a_low, j_low = -a_most, -j_most
+    for i in range(d1.shape[1]):
+        slope = d1[k, i]
+        if abs(slope) > NOTHING:
+            bent, turned = d2[k, i] * v * v, d3[k, i] * v * v * v + 3.0 * d2[k, i] * v * a
+            if slope < 0.0:
+                slope, bent, turned = -slope, -bent, -turned
+            a_low = max(a_low, (-acceleration[i] - bent) / slope)
+            j_low = max(j_low, (-jerk[i] - turned) / slope)
+    return min(a_low, -(LEFT * a_most)), min(j_low, -(LEFT * j_most))
+
+
+@loop
+def interval(s: Floats, k: int, x: float) -> int:
+    """The interval of x, looked for from interval k."""
     while k < len(s) - 2 and s[k + 1] <= x:
         k += 1
+    return k
+
+
+@loop
+def above(s: Floats, v: Floats, k: int, x: float, speed: float) -> bool:
+    """Whether a speed is above the one that can be braked at x in interval k; roots are drawn where it is near."""
+    if speed <= min(v[k], v[k + 1]):
+        return False
+    part = min(max((x - s[k]) / (s[k + 1] - s[k]), 0.0), 1.0)
+    low, high = v[k] * math.sqrt(v[k]), v[k + 1] * math.sqrt(v[k + 1])
+    between = low + (high - low) * part
+    if speed * math.sqrt(speed) <= between:
+        return False
+    return bool(speed > between ** (2.0 / 3.0) * (1.0 + TOUCH) + TOUCH_SPEED)
+
+
+@loop
+def braked(s: Floats, v: Floats, k: int, x: float) -> tuple[int, float]:
+    """(interval, speed of the braking curve) at x, looked for from interval k: v^1.5 is linear, as it is at a rest."""
+    k = interval(s, k, x)
     part = min(max((x - s[k]) / (s[k + 1] - s[k]), 0.0), 1.0)
     low, high = v[k] * math.sqrt(v[k]), v[k + 1] * math.sqrt(v[k + 1])
     return k, (low + (high - low) * part) ** (2.0 / 3.0)
@@ -97,10 +134,10 @@ def can_brake(s: Floats, v: Floats, k: int, x: float, speed: float, gain: float,
               d3: Floats, acceleration: Floats, jerk: Floats, straight: Floats) -> bool:
     """Whether braking as hard as the joints can from (x, speed, gain) stays below the braking curve."""
     while speed > 0.0:
-        k, most = braked(s, v, k, x)
-        if speed > most * (1.0 + TOUCH) + TOUCH_SPEED:
+        k = interval(s, k, x)
+        if above(s, v, k, x, speed):
             return False
-        a_low, _, j_low, _ = left(k, speed, gain, d1, d2, d3, acceleration, jerk, straight)
+        a_low, j_low = left_to_brake(k, speed, gain, d1, d2, d3, acceleration, jerk, straight)
         if gain <= a_low:
             return True
         less = max(gain + j_low * cycle, a_low)

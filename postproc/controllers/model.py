@@ -34,8 +34,8 @@ from postproc.controllers.texts import placeholders
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.units import MM_PER_INCH
 
-SMOOTHING = r"^G[0-9]+(\.[0-9]+)?( [A-Z][0-9]+(\.[0-9]*)?)*$"
-"""words that a reader knows the control's smoothing by"""
+SMOOTHING = r"^G[0-9]+(\.[0-9]+)?(( ?, ?| )[A-Z][0-9]+(\.[0-9]*)?)*$"
+"""words that a reader knows the control's smoothing by; Mazak and Mitsubishi put a comma before some ("G61.1,K3")"""
 SmoothingText = Annotated[str, Field(pattern=SMOOTHING)]
 Worded = Annotated[str, placeholders("letter", "value")]
 
@@ -236,8 +236,8 @@ class ControllerFile(UserModel):
     levels: dict[str, SmoothingLevel] = Field(default_factory=dict)
     """the control's own smoothing by kind of operation, for [output.smoothing] of the set-up"""
     smoothing_words: dict[SmoothingText, Annotated[float, Field(ge=0.0)]] = Field(default_factory=dict)
-    """further words that set the control's smoothing, and the mm that each may take: "G61.1" = 0.005, or
-    "G05 P10000" = 0.005"""
+    """further words that set the control's smoothing, and the mm that each may take: "G61.1" = 0.005,
+    "G61.1,K3" = 0.003 or "G05 P10000" = 0.005"""
     links: LinkRules = LinkRules.unstated()
     pivots: PivotNames = PivotNames.unstated()
     alignment: PartAlignment = PartAlignment.unstated()

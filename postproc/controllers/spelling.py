@@ -115,8 +115,8 @@ class ProgramBlocks(UserModel):
     suffix: Annotated[str, Field(pattern=r"^\.[A-Za-z0-9]+$")] = ".nc"
     """usual ending of the name of a program's file: what `batch` names programs by"""
     stock: tuple[Annotated[str, placeholders("x0", "y0", "z0", "x1", "y1", "z1")], ...] = ()
-    """blocks behind `begin` that state the stock for the control's graphics, where the set-up has one
-    ([rewind.stock]): its least and greatest X, Y, Z, at all places, mm in the first work offset, rotary axes at 0"""
+    """blocks behind `begin` that state the stock for the control's graphics, that of the set-up ([rewind.stock]), else the
+    extents of the cuts: its least and greatest X, Y, Z, at all places, mm in the first work offset, rotary axes at 0"""
     preamble: tuple[Annotated[str, placeholders("work_offset", "units")], ...] = ()
     """safe start: units, modes and planes that the program relies on; {work_offset} is the
     set-up's code, {units} states mm or inches"""

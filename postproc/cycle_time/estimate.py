@@ -24,6 +24,8 @@ COVERAGE = 1.96
 """standard deviations on both sides that hold 95 % of a normal distribution"""
 _LIMITS: tuple[MotionOrder, ...] = get_args(MotionOrder)
 _ORDERS = {"velocity": "", "acceleration": "2", "jerk": "3"}
+NOT_EXECUTED = frozenset(("time.control", "time.plan"))
+"""messages that say that the times of a model of an executed control are those of its formulas"""
 _UNITS = {"corner_tolerance": " mm", "block_time": " s", "stop_time": " s", "spindle_time": " s"}
 _TIMING = {"tool_change": Cause.TOOL_CHANGE, "clamp": Cause.INDEXING, "unclamp": Cause.INDEXING}
 
@@ -91,6 +93,11 @@ def timed(blocks: MotionBlocks, model: CycleTimeModel) -> BlockTimes:
     return by_level(blocks, model, lookahead) if model.kind == "formulas" else lookahead(blocks, model)
 
 
+def executed_by(times: BlockTimes) -> bool:
+    """Whether the times of a model of an executed control are the control's, not its formulas'."""
+    return NOT_EXECUTED.isdisjoint(one.code for one in times.found)
+
+
 def total(blocks: MotionBlocks, times: BlockTimes) -> float:
     """s of the whole program, pauses before the first and behind the last block included."""
     outside = (blocks.pauses.block < 0) | (blocks.pauses.block == len(blocks) - 1)
@@ -99,12 +106,13 @@ def total(blocks: MotionBlocks, times: BlockTimes) -> float:
 
 
 def estimate(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel, with_band: bool = True,
-             times: BlockTimes | None = None) -> Estimate:
+             times: BlockTimes | None = None, off: float | None = None) -> Estimate:
     """Time, bound and band of a program.
 
     Args:
         with_band: False leaves the band at the time itself, for many programs in a row
         times: of a motion that is planned already, instead of the model's; the uncertainties stay the model's
+        off: standard deviation of `times` over the executed control's, as a share; None: what the formulas are off by kind
     """
     model = model.of_machine(machine)
     times = times or timed(blocks, model)
@@ -112,20 +120,21 @@ def estimate(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel, with
     bound = lower_bound(as_used(blocks, model), model)
     if not with_band:
         return Estimate(blocks, model, times, seconds, bound, (seconds, seconds), {}, {})
-    down, up, uncertainties, assumed = _uncertainties(blocks, machine, model, seconds)
+    down, up, uncertainties, assumed = _uncertainties(
+        blocks, machine, model if executed_by(times) else model.quick(), seconds, off)
     low = seconds - down if machine.limits.assumed else max(seconds - down, min(bound, seconds))
     return Estimate(blocks, model, times, seconds, bound, (max(low, 0.0), seconds + up), uncertainties,
                     assumed)
 
 
 def _uncertainties(blocks: MotionBlocks, machine: Machine, model: CycleTimeModel,
-                   seconds: float) -> tuple[float, float, dict[str, float], dict[str, float]]:
+                   seconds: float, off: float | None) -> tuple[float, float, dict[str, float], dict[str, float]]:
     """(s below, s above, standard deviation by origin, that of assumed values by name): every uncertain value is moved by
     one standard deviation, by formulas, whose times change by the same share."""
     known, model = model, model.quick()
     here = timed(blocks, model)
     begin = total(blocks, here)
-    own, scale = own_share(blocks, here, known, begin), seconds / max(begin, 1e-9)
+    own, scale = own_share(blocks, here, known, begin, off), seconds / max(begin, 1e-9)
     low = high = (COVERAGE * own * seconds) ** 2
     assumed, fitted = _assumed_changes(blocks, machine, model), _fitted_changes(blocks, model)
     deviation: dict[str, float] = {}

@@ -50,17 +50,18 @@ def time_by_kind(blocks: MotionBlocks, times: BlockTimes) -> Floats:
     return summed(times.seconds, kinds(blocks, times), len(KINDS))
 
 
-def own_share(blocks: MotionBlocks, times: BlockTimes, model: CycleTimeModel, seconds: float) -> float:
+def own_share(blocks: MotionBlocks, times: BlockTimes, model: CycleTimeModel, seconds: float,
+              off: float | None = None) -> float:
     """Standard deviation of a program's time over the model's own, as a share of `seconds`.
 
     Of a model without a run by kind of motion (`OWN`), arcs and turns that hold their feed as lines at feed; kinds are
     independent of each other. Where the control is not executed, what the formulas are off. Of a calibrated model: what its
     run scatters, and by kind of motion what the model may be off where its parameters fit, each with the time that the
-    program spends in it; errors of the kinds are added as if they all had one sign.
+    program spends in it; errors of the kinds are added as if they all had one sign. `off` where stretches were executed.
     """
     record = model.calibration
     spent = time_by_kind(blocks, times) / max(seconds, 1e-9)
-    formulas = float(spent @ _row(BY_FORMULAS)) if model.kind == "formulas" else 0.0
+    formulas = 0.0 if model.kind != "formulas" else float(spent @ _row(BY_FORMULAS)) if off is None else off
     if record is None and model.own_share is not None:
         return float(np.hypot(model.own_share, formulas))
     if record is None:

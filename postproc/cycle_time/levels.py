@@ -28,7 +28,7 @@ def by_level(blocks: MotionBlocks, model: CycleTimeModel,
     first = np.concatenate([[0], np.flatnonzero(np.diff(level) != 0.0) + 1])
     parts, begin = list[BlockTimes](), 0.0
     for low, high in zip(first.tolist(), [*first[1:].tolist(), len(blocks)], strict=True):
-        part = _stretch(blocks, low, high)
+        part = stretch(blocks, low, high)
         scaled, own = _at(part, model, float(blocks.level[low]))
         times = run(scaled, own)
         parts.append(replace(times, begin=times.begin + begin, end=times.end + begin))
@@ -36,7 +36,7 @@ def by_level(blocks: MotionBlocks, model: CycleTimeModel,
     return parts[0] if len(parts) == 1 else _joined(parts)
 
 
-def _stretch(blocks: MotionBlocks, low: int, high: int) -> MotionBlocks:
+def stretch(blocks: MotionBlocks, low: int, high: int) -> MotionBlocks:
     """Rows from low to before high with their pauses, those before the first block with the first stretch."""
     p = blocks.pauses
     own = ((p.block >= low) | ((p.block < 0) & (low == 0))) & (p.block < high)

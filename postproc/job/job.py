@@ -91,12 +91,12 @@ class Job:
         return self.machine.hooks.under(self.setup.hooks)
 
     @property
-    def stock(self) -> Floats | None:
-        """(2, 3) least and greatest X, Y, Z of the stock, all places, in the first work offset, tables at 0, mm; or None"""
-        if (corners := self.stock_corners) is None or self.control.plane is not None:
-            return None
-        placed = corners - self.control.origin
-        return np.stack([placed.min(axis=0), placed.max(axis=0)])
+    def stock(self) -> Floats:
+        """(2, 3) least, greatest X, Y, Z (mm, first work offset, tables at 0) of the stock, else the cuts, 1 mm or more"""
+        stated = self.stock_corners
+        placed = (self.space.corners if stated is None else stated) - self.control.origin
+        low, high = placed.min(axis=0), placed.max(axis=0)
+        return np.stack([np.minimum(low, high - 1.0), high])
 
     @property
     def stock_corners(self) -> Floats | None:

@@ -222,7 +222,7 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
         return replace(begun, diagnostics=tuple(found))
     asked, at_gauge = start.asked or start.setup, job.setup
     if tool_table:
-        from postproc.verification.tool_table import lengths_at_machine, with_measured
+        from postproc.verification.tool_table import lengths_at_machine, outside, with_measured
 
         measured, more = lengths_at_machine(tool_table, job)
         begun, found, asked = replace(begun, measured=tuple(measured)), [*found, *more], with_measured(asked, measured)
@@ -232,8 +232,10 @@ def verify(gcode: str | FilePath, path: Toolpath, machine: Machine | str | FileP
     comparison, more = read_back(data, job, path.file, progress, str(gcode), NeighbourFiles(gcode),
                                  margins=bool(begun.measured))
     if begun.measured:
-        begun = replace(begun, measured=_with_allowed(begun.measured, comparison, has_errors(more), lambda: read_back(
+        failed = has_errors(more)
+        begun = replace(begun, measured=_with_allowed(begun.measured, comparison, failed, lambda: read_back(
             data, replace(job, setup=at_gauge), path.file, progress, str(gcode), NeighbourFiles(gcode), margins=True)))
+        more = [*(outside(begun.measured, str(tool_table)) if failed else []), *more]
     found = [*other_setup(data, options, has_errors(more), str(gcode)), *found, *more,
              *check_header(data, replace(job, setup=at_gauge), str(gcode)),
              *([] if comparison is None else stated_smoothing(comparison, job, str(gcode)))]

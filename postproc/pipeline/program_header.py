@@ -32,6 +32,8 @@ def header_lines(made: CompiledStage) -> list[str]:
         header.append(f"CL file as read by {made.source.plug_in.stamped()}")
     header += [f"machine by {machine.kind_code}"] * bool(machine.kind_code)
     header += [f"orientation criterion {one.plug_in.stamped()}" for one in criteria_of(made.setup.orientation.criteria)]
+    if made.controller.program.stock and made.setup.rewind.stock is None:
+        header.append("stock of the graphics: extents of the cuts ([rewind.stock] states none)")
     header += _measured(job)
     if made.setup.tool_numbers:
         numbers = dict.fromkeys(f"{t.name} = T{t.number}" for t in made.toolpath.tools if t.name)

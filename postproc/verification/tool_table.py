@@ -43,6 +43,11 @@ class MeasuredLength:
             return ""
         return self.allowed.ends_longer if self.off > self.allowed.longer else self.allowed.ends_shorter
 
+    @property
+    def most(self) -> float:
+        """mm that the program takes in the direction in which the tool is off."""
+        return 0.0 if self.allowed is None else self.allowed.longer if self.off > 0.0 else self.allowed.shorter
+
     def line(self) -> str:
         """For people."""
         text = (f"T{self.number}: gauge length {self.gauge:.4f} mm, register {self.register} of the tool table "
@@ -64,6 +69,18 @@ def with_allowed(found: list[MeasuredLength], margins: tuple[LengthMargin, ...],
             margin = replace(margin, shorter=margin.shorter - more, longer=margin.longer + more)
         result.append(replace(one, allowed=margin))
     return result
+
+
+def outside(measured: tuple[MeasuredLength, ...], file: str) -> list[Diagnostic]:
+    """The error of tools of a program that is not proved with them, whose lengths are beyond what it takes."""
+    bad = [one for one in measured if one.beyond]
+    if not bad:
+        return []
+    said = "; ".join(f"T{one.number} is {abs(one.off):.4f} mm {'longer' if one.off > 0.0 else 'shorter'} than its gauge "
+                     f"length, {one.most:.4f} mm are allowed, then {one.beyond} fails" for one in bad)
+    return [error("tool-table.outside", f"lengths at the machine are outside what the program allows: {said}", file=file,
+                  count=len(bad), hint="write the lengths of the table as gauge_length into [tools.N] of the set-up, and "
+                  "convert again, or set the tools to their gauge lengths")]
 
 
 def lengths_at_machine(file: str | Path, job: Job) -> tuple[list[MeasuredLength], list[Diagnostic]]:

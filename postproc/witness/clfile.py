@@ -255,7 +255,7 @@ def _load(e: Execution, r: Record, line: int) -> None:
     if number is None or number != int(number) or not 0 <= number < 1e9:
         return
     named = _register(r)
-    if named or number != e.tool.now:
+    if named != OWN or (number != e.tool.now and e.register.rows[-1] == e.row):
         e.register.set(e.row, named)
     if number != e.tool.now and e.end.rows[-1] != e.row:
         e.end.set(e.row, (math.nan, math.nan))

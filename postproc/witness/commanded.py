@@ -56,7 +56,7 @@ class Commanded:
         cycle (N,): index into cycles, -1; tool, spindle, coolant (N,): number; -1, 0, 1; "" to words; UNKNOWN
         splines: by row, points (P, 3) of the curve there
         side (N,): 40, 41 or 42 as CUTCOM says it: off, left, right of the path
-        register (N,): length register, OWN where no record names one
+        register (N,): length register that was named last, OWN where none was; registered (N,): row from which on it is
         rpm (N,): NaN where not stated; turned, flowed (N,): row of the last SPINDL and COOLNT record; name (N,): into names
         systems: rotation and origin of every system of the file by its name, in order; first: name of the one
             that the first position is in, "" for the absolute frame, None where that is not sure
@@ -84,6 +84,7 @@ class Commanded:
     tool: Array
     side: Array
     register: Array
+    registered: Array
     name: Array
     names: tuple[str, ...]
     spindle: Array
@@ -112,3 +113,13 @@ def unit(v: Array) -> Array:
     size = np.sqrt((v * v).sum(axis=-1, keepdims=True))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.where(size > 0.0, v / size, np.nan))
+
+
+def loads(tool: Array) -> Array:
+    """(N,) row at which the tool of each row was loaded."""
+    return np.maximum.accumulate(np.where(np.diff(tool, prepend=tool[:1] - 1) != 0, np.arange(len(tool)), 0))
+
+
+def registers_of(c: Commanded, tool: Array) -> Array:
+    """(N,) length register in force: one that was named since the tool of that number, `tool` (N,), was loaded, else OWN."""
+    return np.where(c.registered >= loads(tool), c.register, OWN)

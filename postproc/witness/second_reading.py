@@ -26,7 +26,6 @@ from postproc.witness.turning import check_turning
 
 REST = 2e-3
 """s"""
-
 ZERO = 1e-6
 """mm that reckoning may move the zero of the work offset"""
 
@@ -232,6 +231,7 @@ def _misfits(poses: Poses) -> list[Finding]:
 def check_rests(w: Walked, c: Commanded, match: Array) -> tuple[list[Finding], int]:
     """Rests of another length and stops that the program lacks; how many were compared."""
     e, found, count = w.poses.executed, list[Finding](), len(c.stops)
+    where = np.array([at for at, _ in e.stops])
     rests, asked, taken = dict[tuple[int, int], float](), dict[tuple[int, int], int](), set[int]()
     for row, seconds, line in c.rests:
         here = _between(w, match, row)
@@ -246,7 +246,7 @@ def check_rests(w: Walked, c: Commanded, match: Array) -> tuple[list[Finding], i
                                  asked[first, last], int(e.line[max(first, 0)])))
     for row, kind, line in c.stops:
         first, last = _between(w, match, row)
-        own = [k for k, (at, number) in enumerate(e.stops) if number == kind and first < at <= last and k not in taken]
+        own = [k for k in range(*np.searchsorted(where, (first, last), "right")) if e.stops[k][1] == kind and k not in taken]
         taken.update(own[:1])
         if not own:
             found.append(Finding("rest", f"the program has no M{kind:g} here, where the CL file stops", line,

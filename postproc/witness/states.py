@@ -10,7 +10,18 @@ from typing import Any, Literal
 import numpy as np
 
 from postproc.witness.clamps import limits_of
-from postproc.witness.commanded import ARC, BITS, LINE, OWN, UNFOLLOWED, UNKNOWN, Commanded, WitnessCycle
+from postproc.witness.commanded import (
+    ARC,
+    BITS,
+    LINE,
+    OWN,
+    UNFOLLOWED,
+    UNKNOWN,
+    Commanded,
+    WitnessCycle,
+    loads,
+    registers_of,
+)
 from postproc.witness.evidence import Aspect, Case, Finding, FindingCode, NotCompared
 from postproc.witness.machine import largest_feed, register_beyond
 from postproc.witness.motion import CHUNK, Walked, apart
@@ -38,7 +49,7 @@ def with_spindle(c: Commanded, setup: dict[str, Any]) -> Commanded:
     if not len(c) or not (output or own):
         return c
     tool, silent = tools_of(c, setup), c.spindle == UNKNOWN
-    begin = _loads(tool)
+    begin = loads(tool)
     others = (c.turned < begin) | ((c.turned == begin) & (c.spindle == 0))
     known = ~silent & (c.spindle != UNFOLLOWED)
     spindle, rpm = c.spindle.copy(), c.rpm.copy()
@@ -51,11 +62,6 @@ def with_spindle(c: Commanded, setup: dict[str, Any]) -> Commanded:
         rpm[taken | none] = wanted["rpm"]
         spindle[taken] = 1 if wanted["direction"] == "clockwise" else -1
     return replace(c, spindle=spindle, rpm=rpm)
-
-
-def _loads(tool: Array) -> Array:
-    """(N,) row at which the tool of each row was loaded."""
-    return np.maximum.accumulate(np.where(np.diff(tool, prepend=tool[:1] - 1) != 0, np.arange(len(tool)), 0))
 
 
 def feeds_of(c: Commanded, setup: dict[str, Any], most: float) -> Array:
@@ -189,9 +195,10 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     cuts = (w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)
     rows = np.flatnonzero(w.inside & (w.code > 0) & cuts & (w.on_path() | w.gap | w.returns))
     row = w.targets.row[w.owner[rows] - w.returns[rows]]
-    tool, coolant = tools_of(c, case.setup)[row], _coolants(c, case.setup)[row]
+    every = tools_of(c, case.setup)
+    tool, coolant, named = every[row], _coolants(c, case.setup)[row], registers_of(c, every)[row]
     own = np.where(tool >= 0, tool + (register_beyond(case.machine) if case.registers else 0), tool)
-    register = np.where((c.register[row] == OWN) | (c.register[row] == tool) | (not case.registers), own, c.register[row])
+    register = np.where((named == OWN) | (named == tool) | (not case.registers), own, named)
     register = np.where(e.lengthless[rows] | (not (case.setup.get("output") or {}).get("tool_call", True)), -1, register)
     direction, rpm = c.spindle[row], c.rpm[row]
     if not (case.setup.get("output") or {}).get("tool_call", True):
@@ -232,7 +239,7 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
 def _coolants(c: Commanded, setup: dict[str, Any]) -> Array:
     """(N,) coolant, the set-up's for a tool that no COOLNT record is for: its own, or [output] where none flows."""
     (own, default), tool, result, silent = _stated_coolant(setup), tools_of(c, setup), c.coolant.copy(), c.coolant == UNKNOWN
-    begin = _loads(tool)
+    begin = loads(tool)
     later = np.isin(begin, begin[~silent & (c.flowed >= begin) & (c.coolant != 0)])
     others = ~later & (silent | ((c.flowed < begin) & (c.coolant != UNFOLLOWED)))
     for number in sorted(set(tool[np.isin(tool, list(own)) | bool(default)].tolist())):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -180,10 +181,14 @@ class KlartextWriter(Writer):
 
     def speed_after(self, change: Command) -> float:
         """Spindle speed that a command of the same place, after the tool change, sets; 0 for none."""
-        group = next(g for g in self.program.commands.values() if any(c is change for c in g))
-        after = group[next(i for i, c in enumerate(group) if c is change):]
-        return next((self.spindle_speed(float(c.args[0])) for c in after
+        return next((self.spindle_speed(float(c.args[0])) for c in self.after_changes[id(change)]
                      if c.name.startswith("START_SPINDLE") and c.args), 0.0)
+
+    @cached_property
+    def after_changes(self) -> dict[int, tuple[Command, ...]]:
+        """The commands of the same place from each tool change on, by the change's `id`."""
+        return {id(c): group[i:] for group in self.program.commands.values() for i, c in enumerate(group)
+                if c.name == "CHANGE_TOOL"}
 
     def spindle(self, command: Command) -> Iterator[str]:
         """TOOL CALL with the speed where it is another, then M3 or M4."""

@@ -74,7 +74,7 @@ class Writer(WriterState, ABC):
             self.files[name] = [self.numbered(block) for block in blocks]
 
     def stock_blocks(self) -> list[str]:
-        """The stock for the graphics of the control, where it is known and the control has blocks for it."""
+        """The stock for the graphics of the control, where the control has blocks for it."""
         if self.stock is None or not self.controller.program.stock:
             return []
         values = dict(zip(("x0", "y0", "z0", "x1", "y1", "z1"), self.lengths(self.stock.ravel()), strict=True))

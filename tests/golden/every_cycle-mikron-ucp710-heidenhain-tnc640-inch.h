@@ -1,43 +1,46 @@
 0 BEGIN PGM EVERY_CYCLE INCH
-1 ; postproc 0.2.0
-2 ; source every_cycle.cls
-3 ; machine mikron-ucp710
-4 ; controller heidenhain-tnc640
-5 ; proved by read-back, second reading: all 18 cuts within 0.00001 inch, 0.0001 degrees
-6 ; tolerance 0.0003937008 inch, axis tolerance 0.05 degrees
-7 ; feed mode auto
-8 ; setup without a file, fingerprint of the set-up d1265c0c
-9 ; words: machine coordinates without RTCP, tilted work planes
-10 ; work offset datum number 1 in machine coordinates: X0.00000 Y-1.57480 Z-0.39370 A0.0000 C0.0000
-11 ; pivots that the control must hold, in machine coordinates, all axes at 0, anywhere along each axis:
-12 ; from zero to A: kinematics, Trans X0.00000 Y0.00000 Z0.00000
-13 ; from A to C: kinematics, Trans X0.00000 Y0.00000 Z0.00000
-14 ; tool T1 DR6, diameter 0.2362 inch, gauge length 4.72441 inch
-15 ; tool T2 M6, diameter 0.2362 inch, gauge length 3.75984 inch
-16 ; tool T3 EM10, diameter 0.3937 inch, gauge length 4.33071 inch
-17 ; lengths off are taken up by registers: -1.97 inch and more to +1.5057 inch, then T1 travel Z
-18 ; T3: CUTCOM by the wear, R + DR of T3 in the tool table holds by how much the radius is greater than 0.19685 inch, the words are the path of the tool's centre
-19 ; needs F, and feeds of cycles, counted in tenths of an inch per minute
-20 ; needs option 8 for PLANE: Advanced Function Set 1
-21 ; needs rotary values of 0 in datum number 1
-22 PLANE RESET STAY
-23 CYCL DEF 247 DATUM SETTING ~
+1 BLK FORM 0.1 Z X-1.1811 Y-0.05906 Z-0.68191
+2 BLK FORM 0.2 X+0.7874 Y+1.14097 Z+0.45417
+3 ; postproc 0.2.0
+4 ; source every_cycle.cls
+5 ; machine mikron-ucp710
+6 ; controller heidenhain-tnc640
+7 ; proved by read-back, second reading: all 18 cuts within 0.00001 inch, 0.0001 degrees
+8 ; tolerance 0.0003937008 inch, axis tolerance 0.05 degrees
+9 ; feed mode auto
+10 ; setup without a file, fingerprint of the set-up d1265c0c
+11 ; words: machine coordinates without RTCP, tilted work planes
+12 ; work offset datum number 1 in machine coordinates: X0.00000 Y-1.57480 Z-0.39370 A0.0000 C0.0000
+13 ; stock of the graphics: extents of the cuts ([rewind.stock] states none)
+14 ; pivots that the control must hold, in machine coordinates, all axes at 0, anywhere along each axis:
+15 ; from zero to A: kinematics, Trans X0.00000 Y0.00000 Z0.00000
+16 ; from A to C: kinematics, Trans X0.00000 Y0.00000 Z0.00000
+17 ; tool T1 DR6, diameter 0.2362 inch, gauge length 4.72441 inch
+18 ; tool T2 M6, diameter 0.2362 inch, gauge length 3.75984 inch
+19 ; tool T3 EM10, diameter 0.3937 inch, gauge length 4.33071 inch
+20 ; lengths off are taken up by registers: -1.97 inch and more to +1.5057 inch, then T1 travel Z
+21 ; T3: CUTCOM by the wear, R + DR of T3 in the tool table holds by how much the radius is greater than 0.19685 inch, the words are the path of the tool's centre
+22 ; needs F, and feeds of cycles, counted in tenths of an inch per minute
+23 ; needs option 8 for PLANE: Advanced Function Set 1
+24 ; needs rotary values of 0 in datum number 1
+25 PLANE RESET STAY
+26 CYCL DEF 247 DATUM SETTING ~
 Q339=+1 ;DATUM NUMBER
-24 CYCL DEF 32.0 TOLERANCE
-25 CYCL DEF 32.1 T0.000118
-26 CYCL DEF 32.2 HSC-MODE:0 TA0.015
-27 * - HOLES
-28 L Z+9.84252 R0 FMAX M91
-29 TOOL CALL 1 Z S2000
-30 TOOL DEF 2
-31 M3
-32 M8
-33 L A+30 C+0 FMAX
-34 L X+0 Y+0.01413 FMAX
-35 L Z+4.00607 FMAX
-36 PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX TABLE ROT
-37 L X+0 Y+0 Z+1.5748 FMAX
-38 CYCL DEF 200 DRILLING ~
+27 CYCL DEF 32.0 TOLERANCE
+28 CYCL DEF 32.1 T0.000118
+29 CYCL DEF 32.2 HSC-MODE:0 TA0.015
+30 * - HOLES
+31 L Z+9.84252 R0 FMAX M91
+32 TOOL CALL 1 Z S2000
+33 TOOL DEF 2
+34 M3
+35 M8
+36 L A+30 C+0 FMAX
+37 L X+0 Y+0.01413 FMAX
+38 L Z+4.00607 FMAX
+39 PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX TABLE ROT
+40 L X+0 Y+0 Z+1.5748 FMAX
+41 CYCL DEF 200 DRILLING ~
 Q200=+0.07874 ;SET-UP CLEARANCE ~
 Q201=-0.7874 ;DEPTH ~
 Q206=+59.05512 ;FEED RATE FOR PLNGNG ~
@@ -47,9 +50,9 @@ Q203=+0 ;SURFACE COORDINATE ~
 Q204=+1.5748 ;2ND SET-UP CLEARANCE ~
 Q211=+0 ;DWELL TIME AT DEPTH ~
 Q395=+0 ;DEPTH REFERENCE
-39 L X+0.3937 Y+0 R0 FMAX M99
-40 L X+0.7874 Y+0 R0 FMAX M99
-41 CYCL DEF 203 UNIVERSAL DRILLING ~
+42 L X+0.3937 Y+0 R0 FMAX M99
+43 L X+0.7874 Y+0 R0 FMAX M99
+44 CYCL DEF 203 UNIVERSAL DRILLING ~
 Q200=+0.07874 ;SET-UP CLEARANCE ~
 Q201=-0.7874 ;DEPTH ~
 Q206=+59.05512 ;FEED RATE FOR PLNGNG ~
@@ -64,31 +67,31 @@ Q211=+0 ;DWELL TIME AT DEPTH ~
 Q208=+99999 ;RETRACTION FEED RATE ~
 Q256=+0.00787 ;DIST. FOR CHIP BRKNG ~
 Q395=+0 ;DEPTH REFERENCE
-42 L X+0.3937 Y+0.3937 R0 FMAX M99
-43 L Z+2.39135 FMAX
-44 PLANE RESET STAY
-45 * - TAPS
-46 L Z+9.84252 R0 FMAX M91
-47 M5
-48 M9
-49 TOOL CALL 2 Z S500
-50 M8
-51 TOOL DEF 3
-52 M3
-53 L A+30 C+0 FMAX
-54 L X+0 Y+0.01413 FMAX
-55 L Z+3.2315 FMAX
-56 PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX TABLE ROT
-57 L X+0 Y+0 Z+1.5748 FMAX
-58 CYCL DEF 207 RIGID TAPPING ~
+45 L X+0.3937 Y+0.3937 R0 FMAX M99
+46 L Z+2.39135 FMAX
+47 PLANE RESET STAY
+48 * - TAPS
+49 L Z+9.84252 R0 FMAX M91
+50 M5
+51 M9
+52 TOOL CALL 2 Z S500
+53 M8
+54 TOOL DEF 3
+55 M3
+56 L A+30 C+0 FMAX
+57 L X+0 Y+0.01413 FMAX
+58 L Z+3.2315 FMAX
+59 PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX TABLE ROT
+60 L X+0 Y+0 Z+1.5748 FMAX
+61 CYCL DEF 207 RIGID TAPPING ~
 Q200=+0.11811 ;SET-UP CLEARANCE ~
 Q201=-0.47244 ;DEPTH ~
 Q239=+0.03937 ;THREAD PITCH ~
 Q203=+0 ;SURFACE COORDINATE ~
 Q204=+1.5748 ;2ND SET-UP CLEARANCE
-59 L X+0.3937 Y+0 R0 FMAX M99
-60 L X+0.7874 Y+0 R0 FMAX M99
-61 CYCL DEF 201 REAMING ~
+62 L X+0.3937 Y+0 R0 FMAX M99
+63 L X+0.7874 Y+0 R0 FMAX M99
+64 CYCL DEF 201 REAMING ~
 Q200=+0.11811 ;SET-UP CLEARANCE ~
 Q201=-0.47244 ;DEPTH ~
 Q206=+31.49606 ;FEED RATE FOR PLNGNG ~
@@ -96,44 +99,44 @@ Q211=+0 ;DWELL TIME AT DEPTH ~
 Q208=+31.49606 ;RETRACTION FEED RATE ~
 Q203=+0 ;SURFACE COORDINATE ~
 Q204=+1.5748 ;2ND SET-UP CLEARANCE
-62 L X+0.3937 Y+0.3937 R0 FMAX M99
-63 L Z+2.39135 FMAX
-64 PLANE RESET STAY
-65 * - CONTOUR
-66 L Z+9.84252 R0 FMAX M91
-67 M5
-68 M9
-69 TOOL CALL 3 Z S6000
-70 M8
-71 M3
-72 L A+30 C+0 FMAX
-73 L X-1.1811 Y+0.01413 FMAX
-74 L Z+3.2315 FMAX
-75 PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX TABLE ROT
-76 L X-1.1811 Y+0 Z+1.5748 FMAX
-77 L Z+0.07874 FMAX
-78 L Z-0.07874 F157.48
-79 L X-0.7874 RL
-80 L X+0
-81 CC X+0 Y+0.3937
-82 C X+0.3937 Y+0.3937 DR+
-83 L Y+0.7874 R0
-84 CYCL DEF 9.0 DWELL TIME
-85 CYCL DEF 9.1 DWELL 1.5
-86 CC X+0 Y+0.7874
-87 CP IPA+180 IZ-0.15748 DR+
-88 M0
-89 M3
-90 M8
-/91 L X-0.7874
-/92 L Y+0.98425
-93 L X-0.7874 Y+1.1811 Z-0.23622 R0 F157.48
-94 L Z+1.5748 FMAX
-95 L Z+3.16592 FMAX
-96 PLANE RESET STAY
-97 L Z+9.84252 FMAX M91
-98 L X+0 Y+0 A+0 C+0 FMAX M91
-99 M9
-100 M5
-101 M30
-102 END PGM EVERY_CYCLE INCH
+65 L X+0.3937 Y+0.3937 R0 FMAX M99
+66 L Z+2.39135 FMAX
+67 PLANE RESET STAY
+68 * - CONTOUR
+69 L Z+9.84252 R0 FMAX M91
+70 M5
+71 M9
+72 TOOL CALL 3 Z S6000
+73 M8
+74 M3
+75 L A+30 C+0 FMAX
+76 L X-1.1811 Y+0.01413 FMAX
+77 L Z+3.2315 FMAX
+78 PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX TABLE ROT
+79 L X-1.1811 Y+0 Z+1.5748 FMAX
+80 L Z+0.07874 FMAX
+81 L Z-0.07874 F157.48
+82 L X-0.7874 RL
+83 L X+0
+84 CC X+0 Y+0.3937
+85 C X+0.3937 Y+0.3937 DR+
+86 L Y+0.7874 R0
+87 CYCL DEF 9.0 DWELL TIME
+88 CYCL DEF 9.1 DWELL 1.5
+89 CC X+0 Y+0.7874
+90 CP IPA+180 IZ-0.15748 DR+
+91 M0
+92 M3
+93 M8
+/94 L X-0.7874
+/95 L Y+0.98425
+96 L X-0.7874 Y+1.1811 Z-0.23622 R0 F157.48
+97 L Z+1.5748 FMAX
+98 L Z+3.16592 FMAX
+99 PLANE RESET STAY
+100 L Z+9.84252 FMAX M91
+101 L X+0 Y+0 A+0 C+0 FMAX M91
+102 M9
+103 M5
+104 M30
+105 END PGM EVERY_CYCLE INCH

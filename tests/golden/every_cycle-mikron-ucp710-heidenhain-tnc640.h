@@ -1,42 +1,45 @@
 0 BEGIN PGM EVERY_CYCLE MM
-1 ; postproc 0.2.0
-2 ; source every_cycle.cls
-3 ; machine mikron-ucp710
-4 ; controller heidenhain-tnc640
-5 ; proved by read-back, second reading: all 18 cuts within 0.0001 mm, 0.0001 degrees
-6 ; tolerance 0.01 mm, axis tolerance 0.05 degrees
-7 ; feed mode auto
-8 ; setup without a file, fingerprint of the set-up 2477345d
-9 ; words: machine coordinates without RTCP, tilted work planes
-10 ; work offset datum number 1 in machine coordinates: X0.0000 Y-40.0000 Z-10.0000 A0.0000 C0.0000
-11 ; pivots that the control must hold, in machine coordinates, all axes at 0, anywhere along each axis:
-12 ; from zero to A: kinematics, Trans X0.0000 Y0.0000 Z0.0000
-13 ; from A to C: kinematics, Trans X0.0000 Y0.0000 Z0.0000
-14 ; tool T1 DR6, diameter 6 mm, gauge length 120.0000 mm
-15 ; tool T2 M6, diameter 6 mm, gauge length 95.5000 mm
-16 ; tool T3 EM10, diameter 10 mm, gauge length 110.0000 mm
-17 ; lengths off are taken up by registers: -50 mm and more to +38.245 mm, then T1 travel Z
-18 ; T3: CUTCOM by the wear, R + DR of T3 in the tool table holds by how much the radius is greater than 5.0000 mm, the words are the path of the tool's centre
-19 ; needs option 8 for PLANE: Advanced Function Set 1
-20 ; needs rotary values of 0 in datum number 1
-21 PLANE RESET STAY
-22 CYCL DEF 247 DATUM SETTING ~
+1 BLK FORM 0.1 Z X-30 Y-1.5 Z-17.3205
+2 BLK FORM 0.2 X+20 Y+28.9808 Z+11.5359
+3 ; postproc 0.2.0
+4 ; source every_cycle.cls
+5 ; machine mikron-ucp710
+6 ; controller heidenhain-tnc640
+7 ; proved by read-back, second reading: all 18 cuts within 0.0001 mm, 0.0001 degrees
+8 ; tolerance 0.01 mm, axis tolerance 0.05 degrees
+9 ; feed mode auto
+10 ; setup without a file, fingerprint of the set-up 2477345d
+11 ; words: machine coordinates without RTCP, tilted work planes
+12 ; work offset datum number 1 in machine coordinates: X0.0000 Y-40.0000 Z-10.0000 A0.0000 C0.0000
+13 ; stock of the graphics: extents of the cuts ([rewind.stock] states none)
+14 ; pivots that the control must hold, in machine coordinates, all axes at 0, anywhere along each axis:
+15 ; from zero to A: kinematics, Trans X0.0000 Y0.0000 Z0.0000
+16 ; from A to C: kinematics, Trans X0.0000 Y0.0000 Z0.0000
+17 ; tool T1 DR6, diameter 6 mm, gauge length 120.0000 mm
+18 ; tool T2 M6, diameter 6 mm, gauge length 95.5000 mm
+19 ; tool T3 EM10, diameter 10 mm, gauge length 110.0000 mm
+20 ; lengths off are taken up by registers: -50 mm and more to +38.245 mm, then T1 travel Z
+21 ; T3: CUTCOM by the wear, R + DR of T3 in the tool table holds by how much the radius is greater than 5.0000 mm, the words are the path of the tool's centre
+22 ; needs option 8 for PLANE: Advanced Function Set 1
+23 ; needs rotary values of 0 in datum number 1
+24 PLANE RESET STAY
+25 CYCL DEF 247 DATUM SETTING ~
 Q339=+1 ;DATUM NUMBER
-23 CYCL DEF 32.0 TOLERANCE
-24 CYCL DEF 32.1 T0.003
-25 CYCL DEF 32.2 HSC-MODE:0 TA0.015
-26 * - HOLES
-27 L Z+250 R0 FMAX M91
-28 TOOL CALL 1 Z S2000
-29 TOOL DEF 2
-30 M3
-31 M8
-32 L A+30 C+0 FMAX
-33 L X+0 Y+0.359 FMAX
-34 L Z+101.7542 FMAX
-35 PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX TABLE ROT
-36 L X+0 Y+0 Z+40 FMAX
-37 CYCL DEF 200 DRILLING ~
+26 CYCL DEF 32.0 TOLERANCE
+27 CYCL DEF 32.1 T0.003
+28 CYCL DEF 32.2 HSC-MODE:0 TA0.015
+29 * - HOLES
+30 L Z+250 R0 FMAX M91
+31 TOOL CALL 1 Z S2000
+32 TOOL DEF 2
+33 M3
+34 M8
+35 L A+30 C+0 FMAX
+36 L X+0 Y+0.359 FMAX
+37 L Z+101.7542 FMAX
+38 PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX TABLE ROT
+39 L X+0 Y+0 Z+40 FMAX
+40 CYCL DEF 200 DRILLING ~
 Q200=+2 ;SET-UP CLEARANCE ~
 Q201=-20 ;DEPTH ~
 Q206=+150 ;FEED RATE FOR PLNGNG ~
@@ -46,9 +49,9 @@ Q203=+0 ;SURFACE COORDINATE ~
 Q204=+40 ;2ND SET-UP CLEARANCE ~
 Q211=+0 ;DWELL TIME AT DEPTH ~
 Q395=+0 ;DEPTH REFERENCE
-38 L X+10 Y+0 R0 FMAX M99
-39 L X+20 Y+0 R0 FMAX M99
-40 CYCL DEF 203 UNIVERSAL DRILLING ~
+41 L X+10 Y+0 R0 FMAX M99
+42 L X+20 Y+0 R0 FMAX M99
+43 CYCL DEF 203 UNIVERSAL DRILLING ~
 Q200=+2 ;SET-UP CLEARANCE ~
 Q201=-20 ;DEPTH ~
 Q206=+150 ;FEED RATE FOR PLNGNG ~
@@ -63,31 +66,31 @@ Q211=+0 ;DWELL TIME AT DEPTH ~
 Q208=+99999 ;RETRACTION FEED RATE ~
 Q256=+0.2 ;DIST. FOR CHIP BRKNG ~
 Q395=+0 ;DEPTH REFERENCE
-41 L X+10 Y+10 R0 FMAX M99
-42 L Z+60.7404 FMAX
-43 PLANE RESET STAY
-44 * - TAPS
-45 L Z+250 R0 FMAX M91
-46 M5
-47 M9
-48 TOOL CALL 2 Z S500
-49 M8
-50 TOOL DEF 3
-51 M3
-52 L A+30 C+0 FMAX
-53 L X+0 Y+0.359 FMAX
-54 L Z+82.0801 FMAX
-55 PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX TABLE ROT
-56 L X+0 Y+0 Z+40 FMAX
-57 CYCL DEF 207 RIGID TAPPING ~
+44 L X+10 Y+10 R0 FMAX M99
+45 L Z+60.7404 FMAX
+46 PLANE RESET STAY
+47 * - TAPS
+48 L Z+250 R0 FMAX M91
+49 M5
+50 M9
+51 TOOL CALL 2 Z S500
+52 M8
+53 TOOL DEF 3
+54 M3
+55 L A+30 C+0 FMAX
+56 L X+0 Y+0.359 FMAX
+57 L Z+82.0801 FMAX
+58 PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX TABLE ROT
+59 L X+0 Y+0 Z+40 FMAX
+60 CYCL DEF 207 RIGID TAPPING ~
 Q200=+3 ;SET-UP CLEARANCE ~
 Q201=-12 ;DEPTH ~
 Q239=+1 ;THREAD PITCH ~
 Q203=+0 ;SURFACE COORDINATE ~
 Q204=+40 ;2ND SET-UP CLEARANCE
-58 L X+10 Y+0 R0 FMAX M99
-59 L X+20 Y+0 R0 FMAX M99
-60 CYCL DEF 201 REAMING ~
+61 L X+10 Y+0 R0 FMAX M99
+62 L X+20 Y+0 R0 FMAX M99
+63 CYCL DEF 201 REAMING ~
 Q200=+3 ;SET-UP CLEARANCE ~
 Q201=-12 ;DEPTH ~
 Q206=+80 ;FEED RATE FOR PLNGNG ~
@@ -95,44 +98,44 @@ Q211=+0 ;DWELL TIME AT DEPTH ~
 Q208=+80 ;RETRACTION FEED RATE ~
 Q203=+0 ;SURFACE COORDINATE ~
 Q204=+40 ;2ND SET-UP CLEARANCE
-61 L X+10 Y+10 R0 FMAX M99
-62 L Z+60.7404 FMAX
-63 PLANE RESET STAY
-64 * - CONTOUR
-65 L Z+250 R0 FMAX M91
-66 M5
-67 M9
-68 TOOL CALL 3 Z S6000
-69 M8
-70 M3
-71 L A+30 C+0 FMAX
-72 L X-30 Y+0.359 FMAX
-73 L Z+82.0801 FMAX
-74 PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX TABLE ROT
-75 L X-30 Y+0 Z+40 FMAX
-76 L Z+2 FMAX
-77 L Z-2 F400
-78 L X-20 RL
-79 L X+0
-80 CC X+0 Y+10
-81 C X+10 Y+10 DR+
-82 L Y+20 R0
-83 CYCL DEF 9.0 DWELL TIME
-84 CYCL DEF 9.1 DWELL 1.5
-85 CC X+0 Y+20
-86 CP IPA+180 IZ-4 DR+
-87 M0
-88 M3
-89 M8
-/90 L X-20
-/91 L Y+25
-92 L X-20 Y+30 Z-6 R0 F400
-93 L Z+40 FMAX
-94 L Z+80.4145 FMAX
-95 PLANE RESET STAY
-96 L Z+250 FMAX M91
-97 L X+0 Y+0 A+0 C+0 FMAX M91
-98 M9
-99 M5
-100 M30
-101 END PGM EVERY_CYCLE MM
+64 L X+10 Y+10 R0 FMAX M99
+65 L Z+60.7404 FMAX
+66 PLANE RESET STAY
+67 * - CONTOUR
+68 L Z+250 R0 FMAX M91
+69 M5
+70 M9
+71 TOOL CALL 3 Z S6000
+72 M8
+73 M3
+74 L A+30 C+0 FMAX
+75 L X-30 Y+0.359 FMAX
+76 L Z+82.0801 FMAX
+77 PLANE SPATIAL SPA+30 SPB+0 SPC+0 TURN FMAX TABLE ROT
+78 L X-30 Y+0 Z+40 FMAX
+79 L Z+2 FMAX
+80 L Z-2 F400
+81 L X-20 RL
+82 L X+0
+83 CC X+0 Y+10
+84 C X+10 Y+10 DR+
+85 L Y+20 R0
+86 CYCL DEF 9.0 DWELL TIME
+87 CYCL DEF 9.1 DWELL 1.5
+88 CC X+0 Y+20
+89 CP IPA+180 IZ-4 DR+
+90 M0
+91 M3
+92 M8
+/93 L X-20
+/94 L Y+25
+95 L X-20 Y+30 Z-6 R0 F400
+96 L Z+40 FMAX
+97 L Z+80.4145 FMAX
+98 PLANE RESET STAY
+99 L Z+250 FMAX M91
+100 L X+0 Y+0 A+0 C+0 FMAX M91
+101 M9
+102 M5
+103 M30
+104 END PGM EVERY_CYCLE MM

@@ -16,8 +16,10 @@ from tests.hints.gcode_cases import GCODE
 from tests.hints.import_cases import IMPORTS
 from tests.hints.machine_cases import MACHINE
 from tests.hints.macro_cases import MACROS
+from tests.hints.orient_cases import ORIENT
 from tests.hints.own_room_cases import OWN_ROOMS
 from tests.hints.package_cases import PACKAGES
+from tests.hints.passed_late_cases import PASSED_LATE
 from tests.hints.passed_on_cases import PASSED_ON
 from tests.hints.place_cases import PLACE
 from tests.hints.rare_cases import RARE
@@ -25,4 +27,4 @@ from tests.hints.tool_cases import TOOLS
 from tests.hints.verify_cases import VERIFY
 
 CASES = [*CL, *IMPORTS, *CL_WORDS, *MACHINE, *TOOLS, *CONVERT, *GCODE, *ERRORS, *FILE, *ALIGN, *PLACE, *VERIFY, *EXCHANGE,
-         *OWN_ROOMS, *MACROS, *BATCH, *DESIGN, *PACKAGES, *CALIBRATION, *RARE, *PASSED_ON]
+         *OWN_ROOMS, *MACROS, *BATCH, *DESIGN, *PACKAGES, *CALIBRATION, *RARE, *PASSED_ON, *PASSED_LATE, *ORIENT]

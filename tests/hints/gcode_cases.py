@@ -62,7 +62,8 @@ _ISO = [
     of("gcode.unknown_code", LINUXCNC, "", "M123\n", "", "take it out"),
     of("gcode.decimal_point", FANUC, "", "G05.1 Q1 R5.\nG05.1 Q0\n", "G05.1 Q1 R5\nG05.1 Q0\n", "write a whole number"),
     of("gcode.not_executed", SIEMENS, "", "X1 RND=2\nX3\n", "X1\nX3\n", "write the contour with the end points"),
-    of("gcode.not_executed", FANUC, "", "G51 X0. Y0. P2000\n", "", "write the points as they are meant"),
+    of("gcode.not_executed", HAAS, "", "G101 X0.\n", "", "write the points as they are meant"),
+    of("gcode.decimal_point", FANUC, "", "G51 X0. Y0. P2000\nG50\n", "", "write the decimal point"),
     of("gcode.not_executed", SIEMENS, "", "$P_PFRAME=CTRANS(X,5)\n", "TRANS X5\n", "write TRANS, ROT, SCALE or MIRROR"),
     of("gcode.not_executed", SIEMENS, "", "R1=$P_UIFR[1,X,TR]\n", "R1=0\n", "put the figures into the program"),
     of("gcode.unknown_word", LINUXCNC, "", "G0 B5\n", r"G0 \1 5\n", "its axes are (X)"),
@@ -169,7 +170,7 @@ _KLARTEXT = [
         r"CYCL DEF 9.0 DWELL TIME\n\1\n",
         "(CYCL DEF 9.1 DWELL 0.5)",
     ),
-    of("gcode.syntax", HEIDENHAIN, "", "RND R5\n", "", "allowed are L, C"),
+    of("gcode.syntax", HEIDENHAIN, "", "LINE X5\n", "", "allowed are L, C"),
     of("gcode.mode", HEIDENHAIN, "", "PLANE RESET MOVE\n", r"\1\n", "(PLANE RESET STAY)", machine="mikron-ucp710"),
 ]
 _ASK = [

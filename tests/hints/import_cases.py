@@ -33,6 +33,8 @@ IMPORTS = [
           Edit("shop.ini", "MIN_LIMIT = -100\n[JOINT_1]", "MIN_LIMIT = -100\n\\1 = 100\n[JOINT_1]")),
     _case("import.contradiction", "take out the line", XYZ.replace("UNITS = mm", "UNITS = mm\nLINEAR_UNITS = inch"),
           Edit("shop.ini", "LINEAR_UNITS = inch\n", "")),
+    _case("import.contradiction", "see to the signs of all vectors", TABLE + "$MC_TRAFO5_PART_OFFSET_1[2]=-600\n",
+          Edit("shop.ini", "OFFSET_1[2]=-600", "OFFSET_1[2]=600")),
     _case("import.pin", r"state it: (--set \S+)=VALUE", TRT + "[HAL]\nHALFILE = shop.hal\n", Edit(COMMAND, "shop.toml",
           r"shop.toml \1=20"), shop_hal="net a gui.y => xyzac-trt-kins.y-offset\n"),
     _case("import.file", "put the file where the INI names it", XYZ + "#INCLUDE more.inc\n", Edit("more.inc", "", "[A]\n")),

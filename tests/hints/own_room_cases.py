@@ -12,6 +12,7 @@ from tests.hints.verify_cases import edited
 FILES = {"part.apt": START + CUT + "FINI\n", "s.toml": LENGTH}
 ON = "-m mill-3axis -c fanuc-30i --setup s.toml"
 ON_LINUXCNC = ON.replace("fanuc-30i", "linuxcnc")
+ON_HEAD = "-m head-table -c generic-iso --setup s.toml"
 NAMED = LENGTH + 'called = "EM10"\n'
 SIDEWAYS = START + "RAPID\nGOTO/0,0,60,0,0,1\nGOTO/0,0,0,0,0.5,0.866025404\nGOTO/9,0,0\nRAPID\nGOTO/9,20,34.641016\n"
 NORMAL = START.replace("LOADTL/1\n", "CUTTER/10,5\nLOADTL/1\n") + "MULTAX/ON\n" + (
@@ -79,6 +80,8 @@ _CUTTERS = [
     _body("collision.cutter", r"write (diameter = 10) to \[tools\.1\]", sheet("diameter = 12.0", r"\1"),
           tool=LENGTH + "diameter = 12.0\n"),
 ]
+TURNING = BALL.replace("FEDRAT", "MULTAX\nFEDRAT").replace("GOTO/0,0,0\nGOTO/9,0,0\n", (
+    "GOTO/0,0,0,0.3,0,0.954\nGOTO/3,0,0,0.25,0.1,0.963\nGOTO/6,0,0,0.1,0.25,0.963\nGOTO/9,0,0,0,0.3,0.954\n"))
 _TABLES = [
     _own("tool-table.empty", f"verify p.nc part.apt {ON} --tool-table t.csv", "the columns (register) and (length)",
          Edit("t.csv", "nothing\n", "\\1,\\2\n1,110\n"), first=(f"convert part.apt {ON} -o p.nc",), t_csv="nothing\n"),
@@ -90,6 +93,9 @@ _TABLES = [
          Edit("t.tbl", "X5", r"X\1"), t_tbl="T1 P1 X5 Z110\n", first=(f"convert part.apt {ON_LINUXCNC} -o p.nc",)),
     _own("tool-table.length", f"verify p.nc part.apt {ON} --tool-table t.csv", "measure the tool",
          Edit("t.csv", "1,0", "1,110"), first=(f"convert part.apt {ON} -o p.nc",), t_csv="register,length\n1,0\n2,90\n"),
+    _own("tool-table.outside", f"verify p.nc part.apt {ON_HEAD} --tool-table t.csv", "set the tools to their gauge lengths",
+         Edit("t.csv", "110.3", "110"), first=(f"convert part.apt {ON_HEAD} -o p.nc",), t_csv="register,length\n1,110.3\n",
+         part_apt=TURNING + "FINI\n"),
     convert("tool.called", START + CUT, r"take `(called)` out of \[tools\.N\]", sheet('called = "EM10"\n', ""), setup=NAMED),
     convert("tool.called", "UNITS/MM\n" + nx("A", 1, 5) + nx("B", 2, 6), "give each tool a name of its own",
             sheet("em10", "em20"), setup=NAMED + '[tools.2]\ngauge_length = 80.0\ncalled = "em10"\n',
@@ -97,8 +103,6 @@ _TABLES = [
     edited("gcode.tool_name", CUT, '"EM10"', '"EM99"', r"\[tools\.N\] (called) = ", sheet("EM10", "EM99"),
            setup=NAMED, control="siemens-840d"),
 ]
-TURNING = BALL.replace("FEDRAT", "MULTAX\nFEDRAT").replace("GOTO/0,0,0\nGOTO/9,0,0\n", (
-    "GOTO/0,0,0,0.3,0,0.954\nGOTO/3,0,0,0.25,0.1,0.963\nGOTO/6,0,0,0.1,0.25,0.963\nGOTO/9,0,0,0,0.3,0.954\n"))
 _AXES = [
     convert("orient.fixed", TURNING, r"(\[orientation\]) (cone) of the set-up", sheet("", "\\1\n\\2 = 5.0\n"),
             machine="mikron-ucp710", more=" --orient auto"),

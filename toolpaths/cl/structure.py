@@ -10,7 +10,7 @@ from toolpaths.cl import frames
 from toolpaths.cl.build import Declared, ToolpathBuilder
 from toolpaths.cl.text.statements import Statement
 from toolpaths.cl.text.words import EVENTS, LENGTH_EVENTS
-from toolpaths.cl.tools import describe
+from toolpaths.cl.tools import describe, is_rotating
 from toolpaths.toolpath import Frame, Operation, Role, Tool
 
 _TOOL_PATH = re.compile(r"(.*?),\s*TOOL\s*(?:,(.*))?$", re.IGNORECASE | re.DOTALL)
@@ -146,8 +146,8 @@ def dwell(b: ToolpathBuilder, s: Statement) -> None:
 
 
 def spindl(b: ToolpathBuilder, s: Statement) -> None:
-    """An event; a surface speed belongs to turning."""
-    if s.has("SFM", "SMM"):
+    """An event; a surface speed belongs to turning, but where TLDATA describes a mill or a drill."""
+    if s.has("SFM", "SMM") and not is_rotating(b):
         b.turns()
     plain_event(b, s)
 

@@ -71,6 +71,12 @@ def _use(b: ToolpathBuilder, state: _State) -> None:
     b.tool.set(b.row, Tool(state.number, **state.fields))
 
 
+def is_rotating(b: ToolpathBuilder) -> bool:
+    """Whether the tool in use is described as one that turns: a mill, a drill, a tap, no insert of a lathe."""
+    shape = _state(b).fields.get("shape", "")
+    return bool(shape) and shape not in TURNING
+
+
 def _renumber(state: _State, number: int) -> None:
     """Another tool has another length register."""
     if number != state.number:

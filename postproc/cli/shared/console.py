@@ -207,6 +207,8 @@ def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, A
     if SAYS.job_units:
         diagnostics = _of_another_unit(diagnostics, SAYS.job_units)
     ok = not has_errors(diagnostics)
+    if "diagnostics" not in values:
+        values = values | {"diagnostics": [d.as_dict() for d in diagnostics]}
     if passed and not ok:  # by --strict or the job file's units alone
         unwritten = {"output": None} if "output" in values else {}
         values = values | unwritten | {"diagnostics": [d.as_dict() for d in diagnostics]}

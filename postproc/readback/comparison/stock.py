@@ -19,7 +19,7 @@ _NUMBER = r"([-+]?\d+\.?\d*)"
 
 def check_stock(data: bytes | str, job: Job, faults: Faults) -> list[Diagnostic]:
     """Figures of the stock that differ; nothing where program or set-up state none."""
-    if job.stock is None:
+    if job.setup.rewind.stock is None:
         return []
     text = as_bytes(data[:HEADER]).decode("latin-1")
     wanted = dict(zip(NAMES, job.stock.ravel().tolist(), strict=True))

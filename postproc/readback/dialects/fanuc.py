@@ -67,7 +67,7 @@ class FanucReader(IsoReader):
 
     def tokens(self, data: bytes, file: str) -> tuple[ProgramText, list[Diagnostic]]:
         """The words of one file, program numbers among them."""
-        words, found = tokenise(data, file)
+        words, found = tokenise(data, file, self.comma_groups())
         return ProgramText(words), found
 
     def structure(self, text: ProgramText, file: str) -> tuple[Structure, list[Diagnostic]]:

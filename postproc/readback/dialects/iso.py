@@ -23,7 +23,7 @@ from postproc.readback.text.canonical import (
 )
 from postproc.readback.text.flow import Structure
 from postproc.readback.text.modal import CYCLES, GROUPS, codes, columns, fill, number_of
-from postproc.readback.text.words import Words, tokenise
+from postproc.readback.text.words import Words, comma_words, tokenise
 from toolpaths.arrays import Bools, Floats, Ints, among
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import MM_PER_INCH
@@ -47,8 +47,12 @@ class IsoReader(Reader):
 
     def tokens(self, data: bytes, file: str) -> tuple[ProgramText, list[Diagnostic]]:
         """The words of one file; O numbers name it and do nothing."""
-        words, found = tokenise(data, file)
+        words, found = tokenise(data, file, self.comma_groups())
         return ProgramText(words.take(words.letter != ord("O"))), found
+
+    def comma_groups(self) -> tuple[str, ...]:
+        """Words of the control's smoothing that hold a comma."""
+        return () if self.controller is None else tuple(text for text in self.controller.known_smoothing if "," in text)
 
     def structure(self, text: ProgramText, file: str) -> tuple[Structure, list[Diagnostic]]:
         """One program."""
@@ -76,7 +80,7 @@ class IsoReader(Reader):
         known = self.controller.known_smoothing if self.controller is not None else {}
         new, drop = list[tuple[int, str, float]](), np.zeros(len(words.letter), dtype=bool)
         for number, (text, mm) in enumerate(known.items(), _OWN_LEVELS):
-            stated = [(ord(part[0]), float(part[1:])) for part in text.split(" ")]
+            stated = [(ord(letter), value) for letter, value in comma_words(text)]
             level = next((value for letter, value in stated if letter == ord("R")), float(number))
             for k in np.flatnonzero((words.letter == stated[0][0]) & (words.value == stated[0][1])).tolist():
                 rows = slice(k, k + len(stated))

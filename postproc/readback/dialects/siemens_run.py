@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
+from operator import itemgetter
+
 import numpy as np
 
 from postproc.control.control import InterpolationMode
@@ -37,6 +40,7 @@ TURNING = (3.0, 4.0, 5.0)
 _BY_DISTANCE = (641.0, 645.0)
 _LEVELS = {"_ROUGH": 1.0, "_SEMIFIN": 2.0, "_FINISH": 3.0}
 """of CYCLE832, with _ORI before them too (Cycles 3.25)"""
+_FIRST = itemgetter(0)
 _SEQUENCE = {1: "X", 2: "Y", 3: "Z"}
 
 
@@ -76,8 +80,8 @@ class SiemensRun:
         held = float("nan")
         for b in sorted({*(b for b, _ in path), *stated}):
             distance = stated.get(b, distance)
-            codes_here = [g for at, g in path if at == b]
-            for g in codes_here or [held]:
+            codes_here = path[bisect_left(path, b, key=_FIRST):bisect_right(path, b, key=_FIRST)]
+            for g in [g for _, g in codes_here] or [held]:
                 if g == 9.0:
                     self.new.append((b, SMOOTH, 0.0))
                     self.new += [(b + 1, SMOOTH, self._allowed(b, held, distance))] if b < self.words.lines else []
@@ -186,9 +190,9 @@ class SiemensRun:
     def machine_move(self, b: int) -> None:
         """SUPA: machine coordinates in this block; the tool length must be off."""
         self.new.append((b, "G", 53.0))
-        length = [value for at, value in self.length if at <= b]
+        last = bisect_right(self.length, b, key=_FIRST) - 1
         low, high = np.searchsorted(self.words.line, [b, b + 1])
-        if length and length[-1] >= 0.0 and ord("Z") in self.words.letter[low:high]:
+        if last >= 0 and self.length[last][1] >= 0.0 and ord("Z") in self.words.letter[low:high]:
             self.fault("gcode.machine_position", b, "SUPA with a tool length in force",
                        "write D0 next to SUPA")
 

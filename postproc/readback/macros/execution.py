@@ -29,18 +29,18 @@ ToolsNumbered = Callable[[bytes, str], tuple[bytes, list[Diagnostic]]]
 MacroLanguage = Literal["fanuc", "haas", "linuxcnc", "siemens", "klartext"]
 _NEEDED = {
     "fanuc": re.compile(rb"[#\[]|GOTO|M0*99[ \t]*P|M0*198(?!\d)"
-                        rb"|G0*(?:(?:1[056]|30|31|52|68|92|6[567])(?![\d.])|50(?:\.1)?(?![\d.]))"),
+                        rb"|G0*(?:(?:1[056]|30|31|52|68|92|6[567])(?![\d.])|5[01](?:\.1)?(?![\d.]))"),
     "linuxcnc": re.compile(rb"[#\[]|G0*(?:10|28|30|52|92)(?![\d])|\bO\s*(?:<|\d+\s*[A-Z])"),
     "siemens": re.compile(
         rb"\b(?:DEF|IF|GOTO[FBCS]?|FOR|WHILE|REPEATB?|LOOP|CASE|EXTERN|A?TRANS|A?ROTS?|A?SCALE|A?MIRROR|HOLES[12]|CYCLE801|EXTCALL|SETAL|G53|G153|G20|G21)\b"
         rb"|\bR\d+[ \t]*=|=[ \t]*[-+]*[ \t]*(?!(?:IC|AC|DC|ACP|ACN)[ \t]*\([ \t]*[-+.\d]+[ \t]*\))[A-Z_$(\[]"
         rb"|=[ \t]*[-+]?[\d.]+[ \t]*[-+*/]|\bT[ \t]*=[ \t]*\"|\bPROC\b[^\n]*(?:\(|\bSAVE\b)"
         rb"|\bMCALL[ \t]+(?!CYCLE8)[A-Z_]"),
-    "klartext": re.compile(rb"DECLARE STRING|TRANS DATUM|CYCL DEF[ \t]*7\.|FN[ \t]*\d+[ \t]*:"
+    "klartext": re.compile(rb"DECLARE STRING|TRANS DATUM|CYCL DEF[ \t]*[78]\.|FN[ \t]*\d+[ \t]*:"
                            rb"|(?m:^)[ \t]*(?:\d+[ \t]+)?Q[LRS]?\d+[ \t]*=|Q[LRS]?\d+(?!\d|[ \t]*=)")}
 _SIGNS_OF: dict[MacroLanguage, tuple[bytes, ...]] = {"fanuc": (b"#", b"[", b"GOTO"), "linuxcnc": (b"#", b"[")}
 _BEGINNINGS: dict[MacroLanguage, tuple[re.Pattern[bytes], ...]] = {
-    "fanuc": (re.compile(rb"M0*(?:99[ \t]*P|198)"), re.compile(rb"G0*(?:1[056]|30|31|50|52|92|6[5678])")),
+    "fanuc": (re.compile(rb"M0*(?:99[ \t]*P|198)"), re.compile(rb"G0*(?:1[056]|30|31|50|51|52|92|6[5678])")),
     "linuxcnc": (re.compile(rb"G0*(?:10|28|30|52|92)"), re.compile(rb"O\s*[<\d]"))}
 """one of these stands where `_NEEDED` finds anything: each looked for by its first letter, they are soon absent"""
 _CONTINUED = pattern(rb"~[ \t]*\n")

@@ -22,6 +22,7 @@ from postproc.readback.macros.expressions import (
 from postproc.readback.macros.fanuc_variables import Variables
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.plane_words import PlaneWords
+from postproc.readback.macros.scaled_words import ScaledWords
 from postproc.readback.macros.sources import ProgramFiles, SourceFile
 from postproc.readback.macros.word_blocks import Blocks, Word, coded
 from postproc.readback.text.flow import DEEPEST
@@ -72,6 +73,7 @@ class FanucMacros:
         self.levels: list[Level] = []
         self.modal: ModalCall | None = None
         self.plane = PlaneWords(self.blocks, haas)
+        self.scaled = ScaledWords(self.blocks, self.plane, haas)
         self.variables = Variables(self.blocks, held)
         self.expressions = Expressions(FANUC, self.variable, self._unknown)
         self.words_of: dict[str, list[Word]] = {}
@@ -259,7 +261,8 @@ class FanucMacros:
 
     def written(self, words: Sequence[Word]) -> bool:
         """A block without calls; True where it moves an axis."""
-        made = self.plane.taken(words)
+        made = self.plane.taken(self.scaled.taken(words))
+        self.blocks.within = self.scaled.name or self.blocks.within
         return bool(made) and self.blocks.block(made, self.line)
 
     def subprogram(self, words: Sequence[Word], code: float) -> None:

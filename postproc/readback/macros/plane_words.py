@@ -3,7 +3,7 @@
 Fanuc 16/18 operator's manual, 9.2 polar coordinate command: under G90 the first axis of the plane is the radius from the
 zero of the program, the second the angle, under G91 the angle goes on from the last one, until G15. B-63534EN, coordinate
 system rotation: G68 with the centre and R, degrees counter-clockwise, in the absolute coordinates of the program, until G69.
-Both hold ends and centres of blocks in the plane. G50 and G50.1 end scaling and mirroring, which are not executed.
+Both hold ends and centres of blocks in the plane. G50 and G50.1 that end nothing (`scaled_words.py`) say nothing.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from postproc.readback.macros.word_blocks import Blocks, Word
 
 CENTRES = "IJK"
 _ENDS = (15.0, 50.0, 50.1)
-_NOT_WITHIN = (10.0, 20.0, 21.0, 28.0, 30.0, 31.0, 52.0, 53.0, 92.0, 43.4, 43.5, 234.0, 254.0, 68.2, 17.0, 18.0, 19.0, 54.0,
+NOT_WITHIN = (10.0, 20.0, 21.0, 28.0, 30.0, 31.0, 52.0, 53.0, 92.0, 43.4, 43.5, 234.0, 254.0, 68.2, 17.0, 18.0, 19.0, 54.0,
                55.0, 56.0, 57.0, 58.0, 59.0, 54.1, 154.0)
 """codes that state other coordinates: reference positions, work and local coordinate systems (refused by Fanuc as well)"""
 _WITH_OTHERS = (17.0, 18.0, 19.0, 20.0, 21.0, 54.0, 55.0, 56.0, 57.0, 58.0, 59.0, 54.1, 154.0)
 """of them, those that may stand in the block of G16 or G68 itself"""
-_ROUND, _TIP = (2.0, 3.0), (43.4, 43.5, 234.0)
+_ROUND, TIP = (2.0, 3.0), (43.4, 43.5, 234.0)
 
 
 class PlaneWords:
@@ -55,13 +55,13 @@ class PlaneWords:
             raise MacroFault("gcode.mode", "G16 under G68 is not executed", "G69 before it")
         if codes & {15.0, 16.0}:
             self.polar, self.radius, self.angle = 16.0 in codes, None, None
-        self.blocks.within = self.name if self.polar or self.turned is not None else ""
+        self.blocks.within = self.name_in_force
         words = [w for w in words if w.letter != "G" or w.value not in (*_ENDS, 16.0)]
         if not self.polar and self.turned is None:
             self._behind(words, axes, absolute)
             return words
         for code in sorted(codes):
-            if code in _NOT_WITHIN and not (code in _WITH_OTHERS and codes & {16.0, 68.0}):
+            if code in NOT_WITHIN and not (code in _WITH_OTHERS and codes & {16.0, 68.0}):
                 raise MacroFault("gcode.mode", f"G{code:g} under {self.name} is not executed", f"{self.end} before it")
         given = {w.letter: w.value for w in words}
         if 4.0 in codes or not any(a in given for a in (*axes, *CENTRES)):
@@ -76,7 +76,7 @@ class PlaneWords:
             raise MacroFault("gcode.unknown_code", f"G{min(codes & {15.0, 16.0, 50.1}):g} is no code of Haas",
                              "write the points by X and Y, without polar coordinates")
         if codes & {50.0, 50.1} and any(w.letter in (*AXES, *CENTRES) for w in words):
-            raise MacroFault("gcode.mode", "G50 and G50.1 with axes are not executed", "write them alone, before any G51")
+            raise MacroFault("gcode.mode", "G50 and G50.1 with axes that nothing scales or mirrors", "write them alone")
         letters = (*self.track.held.axes, "R", *(CENTRES if self.polar or self.turned is not None else ()))
         bare = next((w for w in words if w.letter in letters and w.text and "." not in w.text and w.value), None)
         repeats = bare is not None and bare.letter == "K" and self.track.motion not in _ROUND
@@ -91,6 +91,11 @@ class PlaneWords:
             raise MacroFault("gcode.mode", "the first move behind G69 is under G91", f"state {axes[0]} and {axes[1]} under "
                              "G90 before it")
         self.left -= given
+
+    @property
+    def name_in_force(self) -> str:
+        """The code in force, "" for none."""
+        return self.name if self.polar or self.turned is not None else ""
 
     @property
     def name(self) -> str:
@@ -113,7 +118,7 @@ class PlaneWords:
         if self.turned is not None or self.polar or not absolute or not {*axes, "R"} <= set(given) or others:
             raise MacroFault("gcode.mode", "G68 is executed under G90, with both axes of its centre and R alone, in no "
                              "other G68 and not under G16", f"write G90 G68 {axes[0]} {axes[1]} R, and G69 behind it")
-        if self.blocks.tilted or self.blocks.state.get(8) in _TIP:
+        if self.blocks.tilted or self.blocks.state.get(8) in TIP:
             raise MacroFault("gcode.mode", "G68 in a tilted plane or under tool centre point control is not executed",
                              "end them before it")
         self.turned, self.point = (given[axes[0]], given[axes[1]], math.radians(given["R"])), {}

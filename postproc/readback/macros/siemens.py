@@ -10,8 +10,7 @@ from postproc.readback.macros.expressions import Cursor, MacroFault
 from postproc.readback.macros.held import Held
 from postproc.readback.macros.siemens_expressions import SiemensValue, equal, expression, number, skip, split_values, take
 from postproc.readback.macros.siemens_rows import Listing, SiemensRow, listing
-from postproc.readback.macros.siemens_saved import SavedModes
-from postproc.readback.macros.siemens_variables import KINDS, DeclaredVariable, SiemensNames
+from postproc.readback.macros.siemens_variables import KINDS, DeclaredVariable, SavedModes, SiemensNames
 from postproc.readback.macros.siemens_words import SiemensWords
 from postproc.readback.macros.sources import ProgramFiles, SourceFile
 from postproc.readback.macros.word_blocks import Blocks

@@ -21,9 +21,8 @@ from postproc.readback.macros.siemens_expressions import (
 )
 from postproc.readback.macros.siemens_patterns import PATTERNS, positions
 from postproc.readback.macros.siemens_rows import RowDone
-from postproc.readback.macros.siemens_saved import SavedModes, codes_back, take_code
 from postproc.readback.macros.siemens_turned import CENTRES, TurnedBlocks
-from postproc.readback.macros.siemens_variables import SiemensNames
+from postproc.readback.macros.siemens_variables import SavedModes, SiemensNames, codes_back, take_code
 from postproc.readback.macros.word_blocks import Blocks, coded
 
 _WORD = re.compile(r"([A-Z])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)(?![\d.]|[ \t]*=)")

@@ -13,13 +13,13 @@ from toolpaths.diagnostics import Diagnostic, warning
 
 _WHOLE = frozenset("GMTSHDNOLPF")
 """letters whose whole numbers are written without a point"""
-_CYCLES = (73, 74, 76, 81, 82, 83, 84, 85, 86, 87, 88, 89)
-_MOTION = (0, 1, 2, 3, 33, 80, *_CYCLES)
+CYCLES = (73, 74, 76, 81, 82, 83, 84, 85, 86, 87, 88, 89)
+_MOTION = (0, 1, 2, 3, 33, 80, *CYCLES)
 _OFFSETS = (54, 55, 56, 57, 58, 59, 59.1, 59.2, 59.3)
 _LENGTHS = (43, 43.4, 43.5, 44, 234)
 _TILTS = (68.2, 254)
 _GROUPS = {1: (0, 1, 2, 3, 33), 2: (17, 18, 19), 3: (90, 91), 5: (93, 94, 95), 6: (20, 21), 7: (40, 41, 42),
-           8: (43, 43.4, 43.5, 44, 49, 234), 9: (80, *_CYCLES), 10: (98, 99), 14: (*_OFFSETS, 54.1, 154),
+           8: (43, 43.4, 43.5, 44, 49, 234), 9: (80, *CYCLES), 10: (98, 99), 14: (*_OFFSETS, 54.1, 154),
            15: (61, 61.1, 62, 63, 64)}
 """modal groups as the system variables #4001 on number them (B-64484EN)"""
 
@@ -42,7 +42,7 @@ class Blocks:
     Attributes:
         rows, lines: the text that is written on, lines counted through all files; state: modal code by group, and the
             number stated last of each other letter
-        within: G16 or G68, where one is in force
+        within: G16, G68, G51 or G51.1, where one is in force
         linuxcnc: G52, G92 and G10 as LinuxCNC has them, not Fanuc
     """
 
@@ -138,7 +138,7 @@ class Blocks:
                 if w.letter in self.held.axes:
                     track.go_machine(w.letter, w.value * track.scale(w.letter))
             return list(words)
-        cycle = track.motion in _CYCLES
+        cycle = track.motion in CYCLES
         made, before = [], track.at.get(tool)
         for w in words:
             if w.letter in self.held.axes or (cycle and w.letter == "R"):

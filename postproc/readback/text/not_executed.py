@@ -17,6 +17,7 @@ from toolpaths.pattern import pattern
 
 CONTOUR = "write the contour with the end points of its lines and arcs, as a CAM system does"
 POINTS = "write the points as they are meant, without the frame"
+SMOOTHING = 'name it with the mm that it may take in [smoothing_words] of the controller file: "G61.1,K3" = 0.003'
 FIGURES = ("put the figures into the program: what the control's tables hold is not known here; the datum stands in the "
            "set-up")
 FRAME = "write TRANS, ROT, SCALE or MIRROR in the place of the frame variable"
@@ -29,11 +30,10 @@ _RULES: dict[str, tuple[tuple[str, str, str], ...]] = {
                 (r"(?<![A-Z0-9_$])RNDM?[ \t]*=", "RND or RNDM", CONTOUR), (r"\$P_UIFR", "$P_UIFR", FIGURES),
                 (r"\bFRAME\b|(?<![A-Z0-9_$])C(?:TRANS|ROT|SCALE|MIRROR|FINE)[ \t]*\(|\$P_[A-Z]*FRAME",
                  "a frame variable", FRAME)),
-    "fanuc": ((r"G0*51\.1(?!\d)", "G51.1 (mirror image)", POINTS), (r"G0*51(?![.\d])", "G51 (scaling)", POINTS),
-              (r"G0*50\.1(?!\d)", "G50.1 (mirror image)", POINTS), (r"G0*50(?![.\d]).*[XYZIJK]", "G50 with axes", POINTS),
+    "fanuc": ((r"G0*61\.\d[ \t]*,", "G61.1 or G61.2 with a word behind a comma", SMOOTHING),
               (r",[ \t]*[CRA]", "a chamfer, a rounded corner or an angle behind a comma", CONTOUR)),
     "klartext": (*((rf"^[ \t]*\d*[ \t]*(?:{words})", name, hint) for words, name, hint in _CONTOUR_RULES),
-                 (r"CYCL DEF 8\b", "cycle 8 (mirror image)", POINTS), (r"CYCL DEF 10\b", "cycle 10 (rotation)", POINTS),
+                 (r"CYCL DEF 10\b", "cycle 10 (rotation)", POINTS),
                  (r"CYCL DEF (?:11|26)\b", "cycle 11 or 26 (scaling)", POINTS)),
 }
 _RULES["haas"] = (*_RULES["fanuc"], (r"G0*10[01](?![.\d])", "G100 or G101 (mirror image)", POINTS),

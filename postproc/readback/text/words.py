@@ -17,6 +17,7 @@ _COMMENT = re.compile(rb"\([^()\n]*\)|;[^\n]*")
 _WORD = re.compile(rb"\s*([A-Za-z])\s*([-+]?(?:\d+\.?\d*|\.\d+))\s*")
 _SWITCH = re.compile(rb"(?m)^([ \t]*(?:N?[ \t]*\d+[ \t]*)?)/\d?(?=[ \t]*[A-Z\n])")
 _LETTERS = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
+_GROUP = re.compile(r"(,?) ?([A-Z])([0-9.]+)")
 _BLANKS = bytes.maketrans(_LETTERS + b"\n", b" " * 53)
 _NO_LETTERS = bytes(c for c in range(256) if c not in _LETTERS)
 _NEAR = 10_000
@@ -55,20 +56,39 @@ class Words:
         return self.line[here], self.value[here]
 
 
-def tokenise(data: bytes, file: str = "") -> tuple[Words, list[Diagnostic]]:
+def tokenise(data: bytes, file: str = "", commas: tuple[str, ...] = ()) -> tuple[Words, list[Diagnostic]]:
     """The words of a program in letters and numbers.
 
-    Comments and % lines are taken out; what is no word is an error. Blocks with "/" are words like others, with a
+    `commas` are groups of words that are known though commas stand in them ("G61.1,K3"): a letter behind one becomes a small
+    one. Comments and % lines are taken out; what is no word is an error. Blocks with "/" are words like others, with a
     warning: the switch at the control that leaves them out counts as off.
     """
     text = plain(data)
     text = text if text.isupper() else text.upper()
+    text = _behind_commas(text, commas) if commas and b"," in text else text
     marks = _tape_marks(text)
     ends = _between_blocks(text, marks)
     text = _without(text, marks)
     text, found = block_delete(text, file)
     words, more = read_words(text, file)
     return words, [*more, *found, *_early_end(ends, file)]
+
+
+def comma_words(group: str) -> list[tuple[str, float]]:
+    """Letters and numbers of a group of words, letters behind a comma small: "G61.1,K3" is G 61.1 and k 3."""
+    return [(letter.lower() if comma else letter, float(number))
+            for comma, letter, number in _GROUP.findall(group)]
+
+
+def _behind_commas(text: bytes, groups: tuple[str, ...]) -> bytes:
+    """The text with small letters, and no commas, in the places where one of the groups stands."""
+    for group in groups:
+        parts = [(letter, f"{value:.12g}") for letter, value in comma_words(group)]
+        words = ((r",[ \t]*" if letter.islower() else "") + rf"{letter.upper()}[ \t]*0*{re.escape(number)}"
+                 + (r"0*" if "." in number else r"(?:\.0*)?") + r"(?![\d.])" for letter, number in parts)
+        plain_group = "".join(letter + number for letter, number in parts).encode()
+        text = re.sub(r"[ \t]*".join(words).encode(), plain_group, text)
+    return text
 
 
 def plain(data: bytes) -> bytes:

@@ -153,13 +153,6 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(module, name, value)
 
 
-@pytest.mark.parametrize("name", ["uranesx", "h4a-c-table"])
-def test_report_has_its_units_in_its_keys(name: str, few: None) -> None:
-    found = analyse(machines.load(name))
-    assert found["condition_number"]["worst"] > 1.0 and found["reachable_box_mm"] is not None
-    assert set(found["workspace_mm"]) == set("xyz")
-
-
 ALIKE = frozenset({"delta-coplanar", "delta-parallel-x-compact", "delta-parallel-z", "delta-parallel-z-compact",
                    "delta-perpendicular", "delta-star", "linuxcnc-lineardelta", "triaglide", "hexaslide-coplanar",
                    "hexaslide-parallel-z", "linuxcnc-xyzbc-trt", "mikron-ucp710"})
@@ -169,10 +162,13 @@ ALIKE = frozenset({"delta-coplanar", "delta-parallel-x-compact", "delta-parallel
 @pytest.mark.parametrize("name", [pytest.param(one, marks=pytest.mark.slow) if one in ALIKE else one
                                   for one in machines.names()])
 def test_every_machine_is_analysed(name: str, few: None) -> None:
-    """Unlimited axes included; the box is there for all that reach their middle with the tool as at home."""
+    """Unlimited axes included; the box is there for all that reach their middle with the tool as at home. Units stand in
+    the keys of a report."""
     found = analyse(machines.load(name))
     assert found["axes"] == list(machines.load(name).axis_names)
     assert found["reachable_box_mm"] is not None or name == "linuxcnc-pentapod"  # no workspace of it is stated
+    if name in ("uranesx", "h4a-c-table"):
+        assert found["condition_number"]["worst"] > 1.0 and set(found["workspace_mm"]) == set("xyz")
 
 
 @pytest.mark.parametrize(("name", "every", "largest"), [

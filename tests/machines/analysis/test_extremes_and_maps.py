@@ -41,7 +41,7 @@ SAME = {"condition_number": condition_number,
 def test_nothing_found_by_other_code_is_above_what_is_proved(name: str, key: str) -> None:
     """Grid with refinement and random places, by the kinematics of the machine."""
     kin = machines.load(name).kinematics
-    close = CLOSE if kin.leg_geometry.turns != "abc" else 0.5
+    close = CLOSE if kin.leg_geometry.turns != "abc" else 1.0
     found = largest_over(rates_over(kin.leg_geometry, kin.transmits.lever), MEASURES[key], close)
     grid = worst(partial(SAME[key], kin.transmits), kin.workspace, (5, 5, 5, 3))
     place, tilt = kin.workspace.random(np.random.default_rng(0), 500)

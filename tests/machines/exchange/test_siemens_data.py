@@ -63,6 +63,7 @@ def vector(name: str, values: object, first: int | None = None) -> str:
 TABLE = "N24100 $MC_TRAFO_TYPE_1=40\n" + vector("MC_TRAFO5_AXIS1_1", (-1, 0, 0)) + vector(
     "MC_TRAFO5_AXIS2_1", (0, 0, -1)) + vector("MC_TRAFO5_BASE_TOOL_1", (0, 0, -600)) + vector(
     "MC_TRAFO5_JOINT_OFFSET_1", (0, 0.02, -50))
+CLOSED = vector("MC_TRAFO5_PART_OFFSET_1", (0, -0.02, 650))
 AC = AXES.format(first="A", second="C")
 
 
@@ -151,6 +152,8 @@ def test_what_the_header_of_a_program_states_gives_the_machine_back(name: str, r
     ("N24100", "$MC_TRAFO5_JOINT_OFFSET_PART_1[2]=-51\nN24100", "ERROR import.contradiction 20"),
     ("N24100", '$TC_CARR23[1]="P"\n$TC_CARR7[1]=-1\n$TC_CARR12[1]=-1\n$TC_CARR6[1]=-599\nN24100',
      "WARNING import.contradiction 20"),
+    ("N24100", "$MC_TRAFO5_PART_OFFSET_1[2]=-650\nN24100", "WARNING import.contradiction 20"),
+    ("N24100 $MC_TRAFO_TYPE_1=40", "N24100 $MC_TRAFO_TYPE_1=18", "ERROR import.geometry 20"),
     ("N24100", '$TC_CARR23[1]="P"\n$TC_CARR7[1]=-1\n$TC_CARR46[1]=0.004\nN24100', "WARNING import.fine 22"),
 ])
 def test_what_is_wrong_is_said_with_its_line(old: str, new: str, code: str, tmp_path: Path) -> None:
@@ -159,7 +162,8 @@ def test_what_is_wrong_is_said_with_its_line(old: str, new: str, code: str, tmp_
 
 def test_older_types_have_axes_along_their_letters(tmp_path: Path) -> None:
     """Type 33 is the table of type 40 with A along X and C along Z; type 20 = 16 + 4 is a head whose C turns its A."""
-    table = imported(tmp_path, AC + TABLE)[0]
+    table, found = imported(tmp_path, AC + TABLE + CLOSED)
+    assert not any("WARNING" in one for one in found), found
     older = imported(tmp_path, AC + TABLE.replace("TYPE_1=40", "TYPE_1=33"))[0]
     head = imported(tmp_path, AXES.format(first="C", second="A") + TABLE.replace("TYPE_1=40", "TYPE_1=20"))[0]
     assert table is not None and older is not None and head is not None

@@ -195,6 +195,9 @@ def test_odd_figures_come_with_what_cannot_be_read(tmp_path: Path) -> None:
     assert len(made(tmp_path, TRUNNION.replace('"900 ipm"', '"900 in/s"')).diagnostics) == 1, "of one figure"
     text = TRUNNION.replace("-558.4", "558.4").replace("2.8 s", "2.8 h")
     assert {d.code for d in made(tmp_path, text).diagnostics} == {"sheet.figure", "machine.plausible"}, "the sign of a pivot"
+    text = TRUNNION.replace('"762 mm"', '"762"').replace("-254.11", "254.11").replace("22.9 m/min", "22900 mm/s", 1)
+    found = made(tmp_path, text).diagnostics
+    assert [d.lines[0] for d in found] == [line_of(text, part) for part in ('"762"', "22900 mm/s", "MRZP")], found
     assert made(tmp_path, TRUNNION).unread == ("B", "C")
 
 
@@ -209,11 +212,14 @@ def test_a_misspelt_key_hides_no_wrong_figure(tmp_path: Path) -> None:
     assert {d.code for d in faults} == {"file.unknown-key", "file.range", "sheet.figure"}, faults
 
 
-@pytest.mark.parametrize("word", ["counterclockwise", "Anti-Clockwise", "CCW", "anticlockwise"])
+@pytest.mark.parametrize("word", ["counterclockwise", "Anti-Clockwise", "CCW", "turns anticlockwise"])
 def test_a_jog_in_another_spelling(word: str, tmp_path: Path) -> None:
-    ours, other = (made(tmp_path, TRUNNION.replace('"anti-clockwise"', f'"{said}"')).machine
+    ours, other = (made(tmp_path, TRUNNION.replace('"anti-clockwise"', f'"{said}"').replace(
+        '"right up"', '"right side goes up"' if said == word else '"right up"').replace(
+            '["-35 deg", "120 deg"]', '"-35 to 120 deg"' if said == word else '["-35 deg", "120 deg"]')).machine
                    for said in (word, "anti-clockwise"))
-    assert ours is not None and other is not None and '"anti-clockwise"' in TRUNNION
+    assert ours is not None and other is not None and all(
+        was in TRUNNION for was in ('"anti-clockwise"', '"right up"', '["-35 deg", "120 deg"]'))
     q = np.array([[0.0, 0.0, 0.0, 0.2, 0.7]])
     np.testing.assert_array_equal(ours.kinematics.forward(q)[1], other.kinematics.forward(q)[1])
 
@@ -279,8 +285,11 @@ def test_a_rotary_axis_without_ends_by_the_words_of_brochures_and_machine_files(
 
 def test_quantities() -> None:
     assert read_quantity("50 rpm", "turning speed") == 300.0 and read_quantity('30 "', "length") == 762.0
-    with pytest.raises(WrongFigureError, match="no unit"):
-        read_quantity("30", "length")
+    assert read_quantity("25 min-1", "turning speed") == 150.0 == read_quantity("150 deg/sec", "turning speed")
+    assert read_quantity("60 IPM", "speed") == 25.4 and read_quantity("5 m/s^2", "acceleration") == 5000.0
+    for text, says in (("30", "no unit"), ("8,100 mm", "comma")):
+        with pytest.raises(WrongFigureError, match=says):
+            read_quantity(text, "length")
 
 
 def test_the_drawing_shows_travel_pivots_and_senses(tmp_path: Path) -> None:
@@ -347,8 +356,9 @@ def test_readings_that_prove_too_little_prove_nothing(tmp_path: Path, turns: tup
     assert says in fault.message and fault.hint and fault.lines
 
 
-G10 = "G10 L52\nN19700 R-381.02\nN19701 P1 R-254.11\nN19702Q1L1P-558.4\nN19680 R2\n{c}N19704 R.0\nN19705 R0.\nG11"
-CARR = "$TC_CARR4[1]=-381.02\n$TC_CARR5[1]=-254.11\nN5 $TC_CARR6[1]=-558.4\n$TC_CARR15[1]=-0.03\n" \
+G10 = "G10 L52\nN19700 R-381.02 (X)\nN19701 P1 R-254.11\nN19702Q1L1P-558.4\nN19680 R2\n{c}N19704 R.0\nN19705 R0.\nG11"
+CARR = "N1 $TC_CARR1[1]=0 $TC_CARR2[1]=0 $TC_CARR3[1]=0\n" \
+       "$TC_CARR4[1]=-381.02 ; I2\n$TC_CARR5[1]=-254.11\nN5 $TC_CARR6[1]=-558.4 $TC_CARR15[1]=-0.03\n" \
        "$TC_CARR16[1]=0\n$TC_CARR17[1]=0\n$TC_CARR23[2]=\"P\""
 
 

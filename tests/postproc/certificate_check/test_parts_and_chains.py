@@ -53,8 +53,9 @@ def made(which: str) -> Content:
 def test_parts_bars_and_chains_are_confirmed_and_about_their_machines() -> None:
     for name, found in (("uranesx", made("uranesx")), ("h4-rotary", made("bars"))):
         about(deepcopy(found), table_of(name))
-        assert confirmed(deepcopy(found))["boxes"] == len(found["boxes"])
-    assert confirmed(deepcopy(made("uranesx")))["parts_at_least"] == made("uranesx")["proved"]["parts"] > 60.0
+        said = confirmed(deepcopy(found))
+        assert said["boxes"] == len(found["boxes"])
+        assert name != "uranesx" or said["parts_at_least"] == found["proved"]["parts"] > 60.0
     for found in (made("mikron"), made("tilted")):
         about(deepcopy(found), table_of("mikron-ucp710"))
         assert chain_confirmed(deepcopy(found))["travel_at_least"] == found["proved"]["travel"]

@@ -1,4 +1,4 @@
-"""Examples of docs/reference/error-models.md and of the README of its room are as they stand; commands run in tests/docs."""
+"""Every example of docs/reference/error-models.md and of the room's README as it stands; its commands run in tests/docs."""
 
 from __future__ import annotations
 

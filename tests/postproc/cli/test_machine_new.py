@@ -20,7 +20,7 @@ ANSWERS = ("Our trunnion mill", "brochure of 2023, p. 4", "B C", "none", "X",
            "762", "762 mm", "", "22.9 m/min", "", "508 mm", "upper", "900 ipm", "", "20 in", "", "22.9 m/min", "0.3 g",
            "-35 120", "50 rpm", "", "up", "unlimited", "300 deg/s", "", "anti-clockwise",
            "haas", "-381.02 -254.11", "-381.02 -254.11 -558.4", "-381.05 -254.11 -500.2", "8100 rpm",
-           "102 mm to", "102 mm to 610 mm", "500 mm", "2.8 s")
+           "102 mm to", "102 to 610 mm", "500 mm", "2.8 s")
 """with two that are refused and asked again: a length without its unit, a pivot of two numbers"""
 
 

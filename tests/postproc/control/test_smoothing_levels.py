@@ -46,7 +46,7 @@ def test_levels_stand_where_operations_begin(controller: str) -> None:
     rough, fine, off = LEVELS[controller]
     made = good(convert(part(), MACHINE, controller, setup(ROUGH="roughing", FINE="finishing")))
     first, then = made.text.index(rough), made.text.rindex(fine)
-    cuts = [m.start() for m in re.finditer(r"Z-1\b", made.text)]
+    cuts = [m.start() for m in re.finditer(r"(?m)^(?!.*BLK FORM).*Z-1\b", made.text)]
     assert len(cuts) == 3 and first < cuts[0] < then < cuts[1]
     assert not off or re.search(rf"(?m)(^|N\d+ ){re.escape(off)}$", made.text[cuts[2]:])
 
@@ -175,7 +175,7 @@ def test_no_level_on_a_control_without_smoothing(controller: str, asked: str | f
     assert postproc.convert(part(), machines.load(file), controller, setup(FINE=asked)).ok
 
 
-@pytest.mark.parametrize("word", ["G05.1 Q1 R5", "G05 P10000", "G61.1"])
+@pytest.mark.parametrize("word", ["G05.1 Q1 R5", "G05 P10000", "G61.1", "G61.1,K3", "G61.1, R0.01"])
 def test_a_word_of_the_shop_states_what_it_may_move_by(word: str, tmp_path: Path) -> None:
     """In its documented spelling; what it takes counts in the bound, and more than its share is found."""
     own = shop_file(tmp_path, f'program.path_tolerance = ["{word}"]\nkinematics.smoothing_fixed = 0.004\n'
@@ -188,18 +188,21 @@ def test_a_word_of_the_shop_states_what_it_may_move_by(word: str, tmp_path: Path
     assert not convert(part(), MACHINE, own, setup()).ok or word == "G05.1 Q1 R5"
 
 
-@pytest.mark.parametrize(("on", "off"), [("G05 P10000", "G05 P0"), ("G61.1", "G64")])
+@pytest.mark.parametrize(("on", "off"), [("G05 P10000", "G05 P0"), ("G61.1", "G64"), ("G61.1,K3", "G64")])
 def test_a_program_with_words_of_the_shop_is_read_in_every_spelling_of_them(on: str, off: str, tmp_path: Path) -> None:
     """On and off, with and without zeros and blanks; unnamed they are refused, and the hint names [smoothing_words]."""
     own = shop_file(tmp_path, f'smoothing_words = {{ "{on}" = 0.002, "{off}" = 0.0 }}\n', "fanuc-30i")
     usual, made = (good(convert(part(), MACHINE, c, setup())) for c in ("fanuc-30i", own))
-    for first in (on, on.replace("G05 P", "G5P")):
+    for first in (on, on.replace("G05 P", "G5P"), on.replace(",K3", " , K03.")):
         text = made.text.replace("G05.1 Q1", first).replace("G05.1 Q0", off)
         assert made.job is not None and usual.job is not None and first in text
         _, found = read_back(text, made.job, "part.cls")
         assert not [d for d in found if d.severity is Severity.ERROR], first
         _, found = read_back(text, usual.job, "part.cls")
-        assert "[smoothing_words]" in next(d.hint for d in found if d.code == "gcode.unknown_code")
+        assert "[smoothing_words]" in next(d.hint for d in found if d.code in ("gcode.unknown_code", "gcode.not_executed"))
+    for wrong in (",K3" in on) * ("G61.1,K4", "G61.1 K3", "G61.1,K33", "G61.1,I3"):
+        _, found = read_back(text.replace(first, wrong), made.job, "part.cls")
+        assert any(d.severity is Severity.ERROR for d in found), wrong
 
 
 def test_it_is_not_changed_while_a_mode_is_on_where_the_control_cannot() -> None:

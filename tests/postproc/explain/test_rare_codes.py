@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from machines.analysis.certify import Wanted, certify
 from postproc.alignment.readings import _columns
 from postproc.batch.run import _same_version
 from postproc.orientation.turning.turning_report import noted
@@ -37,9 +38,11 @@ def test_a_block_of_stock_that_is_none(tmp_path: Path) -> None:
     assert got.exit_code == 1 and "[setup.stock]" in got.stderr and not (tmp_path / "part.ngc").exists()
 
 
-def test_a_machine_whose_workspace_is_not_proved(tmp_path: Path) -> None:
-    got = run("machine", "certify", "linuxcnc-pentapod", "-o", tmp_path / "cert.json")
-    assert got.exit_code == 1 and "[certificate.legs]" in got.stderr
+def test_a_machine_whose_workspace_is_not_proved() -> None:
+    own = SimpleNamespace(name="own", file="own.toml", kinematics=SimpleNamespace(leg_geometry=None))
+    with pytest.raises(DiagnosticError) as fault:
+        certify(own, Wanted())
+    assert [d.code for d in fault.value.diagnostics] == ["certificate.legs"]
 
 
 def test_a_machine_that_no_probe_is_read_on() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from postproc.readback.macros.held import most_blocks
@@ -10,6 +11,7 @@ from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, TNC, executed, fault
 LINUXCNC = "linuxcnc"
 HEAD = "%\nO0001\nG17 G21 G40 G49 G80 G90 G94 G98\nG54\nG0 X0. Y0. Z0.\n"
 SINUMERIK = "G17 G40 G90 G94 G54 G71\nG0 X0 Y0 Z0\n"
+MIRROR = "CYCL DEF 8.0 MIRROR IMAGE\nCYCL DEF 8.1 "
 DRILL = ("CYCL DEF 200 DRILLING Q200=+2 Q201=-20 Q206=+100 Q202=+5 Q210=+0 Q203=+0 Q204=+10 Q211=+0\n")
 
 
@@ -59,7 +61,61 @@ def test_a_bolt_hole_circle_by_radius_and_angle() -> None:
     assert holes == [pytest.approx([x, y, -20.0]) for x, y in ((86.60254, 50.0), (-86.60254, 50.0), (0.0, -100.0))]
 
 
+@pytest.mark.parametrize(("control", "body", "ends"), [
+    (FANUC, "G51 X10. Y10. Z0. P2.\nG0 X20. Y10.\nG91 X1.\nG90 G50\nG0 X1. Y1.\n", [[30, 10, 0], [32, 10, 0], [1, 1, 0]]),
+    (HAAS, "G51 X10. Y10. P2.\nG0 X20. Y10. Z5.\nG50\nG0 X1.\n", [[30, 10, 10], [1, 10, 10]]),
+    (FANUC, "G51 X0. Y0. Z0. I2. J1. K1.\nG0 X2. Y3. Z4.\nG50\n", [[4, 3, 4]]),
+    (FANUC, "G51.1 X10.\nG0 Y1.\nX0.\nG51.1 Y5.\nX1. Y1.\nG50.1 X0. Y0.\nX2.\n",
+     [[0, 1, 0], [20, 1, 0], [19, 9, 0], [2, 9, 0]])])
+def test_scaled_and_mirrored_points(control: str, body: str, ends: list[list[float]]) -> None:
+    assert track(control, body) == [pytest.approx(end, abs=1e-12) for end in ends]
+
+
+@pytest.mark.parametrize(("body", "plain"), [
+    ("G0 X0. Y5.\nG51.1 X10.\nG0 X20. Y5.\nG2 X30. Y5. I5. J0. F100.\nX40. Y5. R5.\nG50.1 X0.\nX-30. Y5. R5.\n",
+     "G0 X0. Y5.\nG0 X0. Y5.\nG3 X-10. Y5. I-5. J0. F100.\nX-20. Y5. R5.\nG2 X-30. Y5. R5.\n"),
+    ("G51 X0. Y0. Z0. P2.\nG1 X5. Y0. F100.\nG3 X0. Y5. I-5. J0.\nG2 X5. Y0. R5.\nG50\nX0. Y10. R10.\n",
+     "G1 X10. Y0. F100.\nG3 X0. Y10. I-10. J0.\nG2 X10. Y0. R10.\nX0. Y10. R10.\n"),
+    ("G51.1 Y0.\nG41 D1 G1 X9. Y1. F100.\nX20.\nG2 X30. Y11. R10.\nG40 G1 Y30.\nG50.1 Y0.\n",
+     "G42 D1 G1 X9. Y-1. F100.\nX20.\nG3 X30. Y-11. R10.\nG40 G1 Y-30.\n"),
+    ("G51.1 X0.\nG98 G81 X10. Y10. Z-5. R2. F100.\nX20.\nG80\nG50.1 X0.\n",
+     "G98 G81 X-10. Y10. Z-5. R2. F100.\nX-20.\nG80\n")])
+def test_circles_contours_and_holes_run_as_the_same_program_written_out(body: str, plain: str) -> None:
+    """G2 and G3, G41 and G42 interchanged where one axis of the plane is mirrored, radii scaled."""
+    one, other = (good(FANUC, f"{HEAD}{text}M30\n%\n") for text in (body, plain))
+    columns = [np.nan_to_num(np.asarray(getattr(m, name), dtype=float))
+               for name in ("code", "ccw", "center", "hole", "compensation") for m in (one, other)]
+    assert all(a == pytest.approx(b, abs=1e-9) for a, b in zip(columns[::2], columns[1::2], strict=True))
+    assert words(one) == [pytest.approx(row, abs=1e-9) for row in words(other)]
+
+
+def test_a_mirror_image_of_klartext_is_the_same_program_written_out() -> None:
+    """About the datum in force; DR and the side of the tool turn round where one axis of the plane is mirrored."""
+    for body, plain in (
+            (f"TRANS DATUM AXIS X+10\n{MIRROR}X\nL X+5 Y+3 RL F100\nL IX+2\nCC X+0 Y+0\nC X+7 Y-3 DR+\nL X+0 R0\n"
+             f"{MIRROR}\nL X+1\n",
+             "L X+5 Y+3 RR F100\nL X+3\nCC X+10 Y+0\nC X+3 Y-3 DR-\nL X+10 R0\nL X+11\n"),
+            (f"{MIRROR}X Y\nL X+5 Y+3 F100\nCR X+7 Y+3 R+1 DR-\n", "L X-5 Y-3 F100\nCR X-7 Y-3 R+1 DR-\n")):
+        one, other = (good(TNC, f"BEGIN PGM A MM\nL X+0 Y+0 Z+0 R0 FMAX\n{text}L M30\nEND PGM A MM\n")
+                      for text in (body, plain))
+        assert (one.ccw == other.ccw).all() and (one.compensation == other.compensation).all()
+        np.testing.assert_allclose(words(one), words(other), atol=1e-9)
+
+
 @pytest.mark.parametrize(("control", "text"), [
+    (TNC, MIRROR + "Z\n"), (TNC, MIRROR + "X\nLP PR+10 PA+0 FMAX\n"), (TNC, MIRROR + "X\nTRANS DATUM AXIS X+1\n"),
+    (TNC, MIRROR + "X\nL X+1 F100 M128\n"), (TNC, "L X+1 Y+1 RL F100\n" + MIRROR + "X\n"),
+    (TNC, MIRROR + "X\nCYCL DEF 10.0 ROTATION\nCYCL DEF 10.1 ROT+9\n"),
+    (TNC, MIRROR + "X\nCYCL CALL POS X+1 Y+1 Z+0 FMAX\n"),
+    (FANUC, "G51 X0. Y0. P2000\n"), (FANUC, "G51 X0. Y0. Z0. P2.\nG81 X1. Y1. Z-1. R1. F9.\n"), (FANUC, "G51.1 X0.\nG55\n"),
+    (FANUC, "G51.1 X0.\nG68 X0. Y0. R9.\n"), (FANUC, "G68 X0. Y0. R9.\nG51.1 X0.\n"), (FANUC, "G51.1 X0.\nG50.1\n"),
+    (FANUC, "G51 X0. Y0. Z0. I1. J2. K1.\nG2 X4. Y0. R2. F9.\n"), (FANUC, "G41 D1 G1 X5. F9.\nG51.1 X0.\n"),
+    (FANUC, "G51.1 X0.\n#1=#5041\n"), (FANUC, "G51.1 X0.\nG51 X0. Y0. Z0. P2.\n"), (FANUC, "G51 X0. Y0. Z0.\n"),
+    (FANUC, "G51 X0. Y0. Z0. P2. I2. J2. K2.\n"), (FANUC, "G51 X0. P0.\n"), (FANUC, "G91\nG51 X0. Y0. Z0. P2.\n"),
+    (FANUC, "G0 X1. G51.1 X0.\n"), (FANUC, "G51.1 X0.\nG0 X10\n"), (FANUC, "G51.1 X0.\nG18\n"),
+    (FANUC, "G51.1 X0.\nG28 Z0.\n"),
+    (FANUC, "G51.1 X0.\nG50\n"), (FANUC, "G51.1 Z0.\nG81 X1. Y1. Z-1. R1. F9.\n"), (FANUC, "G43.4 H1\nG51.1 X0.\n"),
+    (HAAS, "G51.1 X0.\n"), (HAAS, "G51 X0. Y0. P2\n"),
     (FANUC, "G16\nG0 X10.\n"), (FANUC, "G16\nG1 X9. Y0. F9\nG2 X9. Y90. I-9. J0.\n"), (HAAS, "G16\nG91 G0 X9. Y9.\n"),
     (FANUC, "G68 R30.\n"), (FANUC, "G68 X1. Y1. R30.\nG0 X4.\n"), (FANUC, "G68 X1. Y1. R30.\nG0 X4. Y4.\nG91 X1.\n"),
     (FANUC, "G68 X1. Y1. R30.\nG28 Z0.\n"), (FANUC, "G68 X1. Y1. R30\nG69\n"), (FANUC, "G16\nG0 X10 Y30.\n"),
@@ -130,7 +186,7 @@ def test_o_words_and_a_file_beside() -> None:
 def test_faults_stand_at_the_line_that_was_written() -> None:
     text = HEAD + "#1=1.\nWHILE[#1LT3]DO1\nG2 X#1 R.1 F9\n#1=#1+1\nEND1\nM30\n%\n"
     assert faults(FANUC, text).get("gcode.arc") == [8]
-    assert faults(FANUC, text.replace("G2 ", "G51 "))["gcode.not_executed"] == [8]
+    assert faults(FANUC, text.replace("G2 ", "G51 "))["gcode.mode"] == [8]
     _, found = executed(FANUC, HEAD + "G65 P9000\nM30\n%\n", others={"O9000.nc": b"O9000\n\nG0 X#500\nM99\n"})
     assert [(d.code, d.file, d.lines) for d in found] == [("gcode.variable", "O9000.nc", (3,))]
 

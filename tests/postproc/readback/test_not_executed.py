@@ -15,9 +15,9 @@ TNC = "BEGIN PGM A MM\nTOOL CALL 1 Z S900\nL X+0 Y+0 Z+50 R0 FMAX M3\nL Z+0 F500
 REFUSED = (
     ("siemens-840d", SIN, ("ANG=30", "X10 CHF=2", "X10 CHR=2", "X10 RND=2", "RNDM=2", "R1=$P_UIFR[1,X,TR]", "DEF FRAME M1",
                            "$P_UIFR[1]=CTRANS(X,1)", "$P_PFRAME=CROT(Z,45)", "SUBP(1)\nM30\nPROC SUBP(REAL A)")),
-    ("fanuc-30i", ISO, ("G51 X0. Y0. P2000", "G51.1 X0.", "G50.1 X0.", "X10. ,C2.", "X10. ,R2.", "X5. ,A30.")),
-    ("haas-ngc", ISO, ("G51 X0. Y0. P2.", "G101 X0.", "G47 P0 X0. Y0. J10.", "G112", "G12 I5.", "G150 X0. Y0. P5")),
-    ("heidenhain-tnc640", TNC, ("CYCL DEF 8.0 MIRROR IMAGE", "CYCL DEF 10.0 ROTATION", "CYCL DEF 11.0 SCALING", "RND R2",
+    ("fanuc-30i", ISO, ("X10. ,C2.", "X10. ,R2.", "X5. ,A30.")),
+    ("haas-ngc", ISO, ("G101 X0.", "G47 P0 X0. Y0. J10.", "G112", "G12 I5.", "G150 X0. Y0. P5")),
+    ("heidenhain-tnc640", TNC, ("CYCL DEF 10.0 ROTATION", "CYCL DEF 11.0 SCALING", "RND R2",
                                 "CHF 2", "APPR LT X+0 Y+0 LEN5 RL", "DEP LT LEN5", "FL X+5")))
 
 

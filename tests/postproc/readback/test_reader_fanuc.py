@@ -143,7 +143,7 @@ def test_subprograms_of_other_files() -> None:
 
 
 def test_a_fault_in_another_file_points_there() -> None:
-    others = {"O77.nc": b"%\nO0077\nG2 X1. R.1 F9\nM99\n%\n", "O78.nc": b"%\nO78\nG51 X1.\nM99\n%\n"}
+    others = {"O77.nc": b"%\nO0077\nG2 X1. R.1 F9\nM99\n%\n", "O78.nc": b"%\nO78\nG999 X1.\nM99\n%\n"}
     _, found = executed(FANUC, program("G0 X0. Y0. Z0.\nM98 P77\n"), others=others)
     assert [(d.code, d.file, list(d.lines)) for d in found] == [("gcode.arc", "O77.nc", [3])], "O78 is not called"
     _, found = executed(FANUC, program("G0 X0. Y0. Z0.\nM98 P78\n"), others=others)
@@ -174,8 +174,7 @@ def test_programs_that_cannot_be_followed(body: str, code: str) -> None:
 
 
 @pytest.mark.parametrize(("block", "code"), [
-    ("G51 X0. P2.", "gcode.unknown_code"), ("G51 X0. Y0. P2.", "gcode.unknown_code"), ("G10 L3 P1 R1.",
-                                                                                        "gcode.data_setting"),
+    ("G10 L3 P1 R1.", "gcode.data_setting"),
     ("#1=#500", "gcode.variable"), ("#3000=1", "gcode.alarm"), ("G43.5 H1", "gcode.unknown_code"),
     ("G76 X0. Z-1. R1. Q.1", "gcode.unknown_code"), ("G87 X0.", "gcode.unknown_code"), ("#1=1/0", "gcode.expression"),
     ("G65 P9810", "gcode.subprogram"), ("#1=#3012", "gcode.variable"), ("IF[#1EQ#0]GOTO5", "gcode.jump"),

@@ -1,4 +1,4 @@
-"""The stock in the program (BLK FORM) is that of the set-up, in mm and in inches."""
+"""The stock in the program (BLK FORM) is that of the set-up, in mm and in inches; without one the extents of the cuts."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import machines
 import postproc
 import toolpaths
 from postproc.setup.model import SetupFile
-from tests.postproc.kit import codes, good
+from tests.postproc.kit import codes, good, toolpath
 
 
 def with_stock(width: float, units: str) -> SetupFile:
@@ -41,3 +41,17 @@ def test_the_stock_of_several_places_holds_all_of_them() -> None:
     setup = SetupFile.model_validate({**with_stock(70.0, "mm").model_dump(), "places": places})
     result = good(postproc.convert(path, machines.load("mill-3axis"), "heidenhain-tnc640", setup, diagnostics=found))
     assert result.text.splitlines()[1:3] == ["1 BLK FORM 0.1 Z X-70 Y-70 Z-30", "2 BLK FORM 0.2 X+220 Y+70 Z+0"]
+
+
+def test_without_a_stock_the_form_is_that_of_the_cuts(tmp_path: Path) -> None:
+    """One contour is a box too, a millimetre thick; it is graphics alone, so another one or none is proved all the same."""
+    path = toolpath("LOADTL/1", "RAPID", "GOTO/5,2,20", "FEDRAT/500,MMPM", "GOTO/5,2,-3", "GOTO/35,2,-3", "GOTO/35,2,20")
+    machine, setup = machines.load("mill-3axis"), SetupFile.model_validate({
+        "tools": {"1": {"gauge_length": 100.0}}, "part": {"origin": (12.0, -7.0, 30.0)}})
+    result = good(postproc.convert(path, machine, "heidenhain-tnc640", setup))
+    form = ["1 BLK FORM 0.1 Z X+5 Y+1 Z-3", "2 BLK FORM 0.2 X+35 Y+2 Z+20"]
+    assert result.text.splitlines()[1:3] == form and "stock of the graphics: extents of the cuts" in result.text
+    program = tmp_path / "p.h"
+    for other in (result.text.replace("X+35 Y+2 Z+20", "X+60 Y+9 Z+1"), result.text.replace("\n".join(form) + "\n", "")):
+        program.write_text(other)
+        assert other != result.text and postproc.verify(program, path, machine, "heidenhain-tnc640", setup).ok

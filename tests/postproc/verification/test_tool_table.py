@@ -124,6 +124,10 @@ def test_verify_takes_the_lengths_of_the_table(tmp_path: Path) -> None:
         assert f"register 1 of the tool table {float(length):.4f} mm" in text
         assert re.search(r"allowed -0\.02\d\d to \+0\.02\d\d", text) and (": tolerance fails)" in text) == (not right)
         assert ("NOT proved" in text) == (not right) and ("second witness agrees" in text) == right
+        named = re.search(r"tool-table.outside\] .*T1 is ([\d.]+) mm (longer|shorter) .* 0\.02\d\d mm are allowed", text)
+        assert (named is None) == right
+        assert named is None or (float(named[1]), named[2]) == (
+            pytest.approx(abs(float(length) - 120.0)), "longer" if float(length) > 120.0 else "shorter")
     table.write_text("T7 P1 Z120\n")
     code, text = run(*verify)
     assert code == 1 and "tool-table.missing" in text and "no length of register 1 (T1)" in text

@@ -13,6 +13,7 @@ from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile
 from postproc.verification.second_witness import second_witness
 from postproc.witness.clfile import commanded
+from postproc.witness.commanded import OWN, registers_of
 from postproc.witness.states import tools_of
 from toolpaths.cl.build import ToolpathBuilder
 
@@ -116,3 +117,29 @@ def test_a_witness_that_fails_proves_nothing(proof: bool, monkeypatch: pytest.Mo
     assert [d.code for d in result.diagnostics if d.code.startswith("witness")] == ["witness.failed"] * proof
     assert result.ok is not proof
     assert second_witness(None, SetupFile(), Options(), result.job, result.comparison)[1] == []
+
+
+SAME_NUMBER = ("TOOL PATH/{0},TOOL,{0}\nLOAD/TOOL,3{1}\nSPINDL/RPM,1000,CLW\nFEDRAT/MMPM,600\nRAPID\nGOTO/0,0,50\n"
+               "GOTO/0,0,5\nGOTO/9,0,5\nRAPID\nGOTO/9,0,50\nEND-OF-PATH\n")
+NAMED = {"tool_numbers": {"D10": 3, "D6": 1}, "tools": {n: {"gauge_length": 80.0} for n in ("1", "3")}}
+
+
+@pytest.mark.parametrize("control", ["linuxcnc", "fanuc-30i", "siemens-840d", "haas-ngc", "generic-iso",
+                                     "heidenhain-tnc640"])
+@pytest.mark.parametrize("adjusts", [("", ""), (",ADJUST,3", ""), ("", ",ADJUST,3"), (",ADJUST,3", ",ADJUST,3"),
+                                     (",ADJUST,3", "", ",ADJUST,3")])
+def test_a_register_is_of_the_tool_that_the_set_up_numbers(control: str, adjusts: tuple[str, ...]) -> None:
+    """Two tools of one number told apart by name: the second has its own register where its record names none."""
+    text = "UNITS/MM\n" + "".join(SAME_NUMBER.format(("D10", "D6")[k % 2], said) for k, said in enumerate(adjusts))
+    if control in ("siemens-840d", "heidenhain-tnc640") and ",ADJUST,3" in adjusts:
+        text = text.replace(",ADJUST,3", ",ADJUST,1")  # one edge there
+    result = converted(text.encode(), NAMED, control)
+    assert result.ok, [str(d) for d in result.diagnostics if d.severity]
+
+
+def test_the_register_that_a_record_names_is_in_force_from_there() -> None:
+    text = "UNITS/MM\n" + "".join(SAME_NUMBER.format(name, said) for name, said in (
+        ("D10", ",ADJUST,3"), ("D6", ""), ("D6", ",ADJUST,9")))
+    c = commanded(text.encode())
+    assert registers_of(c, tools_of(c, NAMED)).tolist() == [3] * 4 + [OWN] * 4 + [9] * 4
+    assert registers_of(c, tools_of(c, {})).tolist() == [3] * 8 + [9] * 4

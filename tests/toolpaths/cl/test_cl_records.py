@@ -185,6 +185,11 @@ def test_turning_is_reported(text: str) -> None:
     assert [op.turning for op in read(text).operations] == [True]
 
 
+def test_a_mill_at_a_surface_speed_is_no_turning() -> None:
+    p = read("TOOL PATH/A,TOOL,T\nTLDATA/MILL,10,0,75,0,0\nLOAD/TOOL,1\nSPINDL/SMM,200,CLW\nGOTO/1,2,3\n")
+    assert [op.turning for op in p.operations] == [False]
+
+
 @pytest.mark.parametrize("text", ["SPINDL/ 500.0,SMM,CCLW\nTRNTYP/WORLD,0,0,0\nGOTO/1,2,3\n",
                                   "$$*CATIA0\nSPINDL/ 500.0,SMM,CCLW\n$$ OPERATION NAME : Face.1\nGOTO/1,2,3\n"])
 def test_turning_reported_before_its_operation_begins_is_of_that_operation(text: str) -> None:
