@@ -10,8 +10,9 @@ import importlib.util
 from functools import cache
 from pathlib import Path
 
-_MARKS = {"machines": "loader.py", "toolpaths": "toolpath.py"}
-"""by package: a file that it has"""
+_MARKS = {"machines": ("loader.py", '"""What a machine can do: '),
+          "toolpaths": ("toolpath.py", '"""What the cutter must do, ')}
+"""by package: a file that it has, how its door begins (another package installed over ours replaces the door alone)"""
 
 
 def _names_in(folder: Path) -> set[str]:
@@ -21,6 +22,15 @@ def _names_in(folder: Path) -> set[str]:
         return set()
 
 
+def _door(folder: Path, begins: str) -> bool:
+    """True where a package's door begins so."""
+    try:
+        with (folder / "__init__.py").open(encoding="utf-8", errors="replace") as door:
+            return door.read(len(begins)) == begins
+    except OSError:
+        return False
+
+
 @cache
 def foreign() -> str:
     """What stands in the place of one of our packages, and what to do; "" where all is well.
@@ -28,10 +38,10 @@ def foreign() -> str:
     Nothing is imported; it is looked at once.
     """
     here = Path(__file__).parents[2]
-    for name, mark in _MARKS.items():
+    for name, (mark, begins) in _MARKS.items():
         spec = importlib.util.find_spec(name)
         places = [Path(one) for one in (spec.submodule_search_locations or [] if spec else [])]
-        if here / name not in places or mark not in _names_in(here / name):
+        if here / name not in places or mark not in _names_in(here / name) or not _door(here / name, begins):
             other = spec.origin if spec is not None else "nothing"
             return (f"Python finds {other} in the place of the package {name} of postproc ({here / name}); "
                     "run it from another folder, or install postproc into an environment of its own "

@@ -75,10 +75,10 @@ def part(passes: int = 4, step: int = 5) -> str:
              "LOAD/TOOL,1,ADJUST,1", "SPINDL/RPM,8000,CLW", "COOLNT/FLOOD"]
     for k in range(passes):
         y = -10.0 * k
-        lines += ["RAPID", f"GOTO/0.0000,{y:.4f},40.0000,0.0000000,0.0000000,1.0000000", "FEDRAT/MMPM,250.0",
+        lines += ["RAPID", f"GOTO/0.0000,{y:.4f},5.0000,0.0000000,0.0000000,1.0000000", "FEDRAT/MMPM,250.0",
                   f"GOTO/0.0000,{y:.4f},0.0000", "FEDRAT/MMPM,2000.0",
                   *(f"GOTO/{x:.4f},{y:.4f},{-2.0 * math.sin(x / 9.0):.4f}" for x in range(1, 27, step)), "RAPID",
-                  f"GOTO/26.0000,{y:.4f},40.0000"]
+                  f"GOTO/26.0000,{y:.4f},5.0000"]
     return "\n".join([*lines, "END-OF-PATH", "FINI", ""])
 
 
@@ -184,7 +184,8 @@ def stages() -> dict[str, Stage]:
                     **{f"mikron-ucp710-{axis}.csv": f"samples/errors/mikron-ucp710-{axis}.csv" for axis in "XYZ"}},
             before={"time part.ngc -m mikron-ucp710 -c linuxcnc --calibrate": partial(logged, "part.ngc", "linuxcnc"),
                     "place": _placed},
-            instead={"-j 4": "-j 1", " --figures pictures": "", "-m trunnion-bc -c fanuc-30i": "-c fanuc-30i",
+            instead={"setup new part.cls": "setup new part.cls --yes", "-j 4": "-j 1",
+                     " --figures pictures": "", "-m trunnion-bc -c fanuc-30i": "-c fanuc-30i",
                      "orient part.cls": "orient part.cls --max-tilt 5", "--orient auto": "--orient auto --max-tilt 5"}),
         "docs/how-to/calibrate-the-time.md": Stage(  # so small a part leaves nothing to measure: test every move
             instead={"time part.nc -m mikron-ucp710 -c siemens-840d --plan": "time -m mikron-ucp710 -c siemens-840d --plan"},

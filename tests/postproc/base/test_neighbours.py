@@ -31,6 +31,18 @@ def test_another_one_is_named(name: str, package: bool, tmp_path: Path) -> None:
     assert "by mistake" not in ran.stderr and len(ran.stderr.splitlines()) == 1
 
 
+def test_one_that_is_installed_over_ours_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """pip lets a second distribution replace the door of our package: `machine list` ended with a fault."""
+    ours = tmp_path / "machines" / "__init__.py"
+    ours.parent.mkdir()
+    (tmp_path / "machines" / "loader.py").write_text("", encoding="utf-8")
+    ours.write_text("WHAT = 'other'\n", encoding="utf-8")
+    monkeypatch.setattr(neighbours, "__file__", str(tmp_path / "postproc" / "base" / "neighbours.py"))
+    monkeypatch.delitem(sys.modules, "machines", raising=False)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert str(ours) in foreign.__wrapped__()
+
+
 def test_from_python_it_is_an_import_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(neighbours, "foreign", lambda: "another package")
     with pytest.raises(ImportError, match="another package"):
