@@ -78,7 +78,7 @@ def check_travel(path: JointPath, moves: Moves, control: Control, kinematics: Ca
         bad = over > TRAVEL_SLACK
         if bad.any():
             diagnostics.append(_excess(path, moves, control, j, rows[bad], low[bad, j], high[bad, j], over[bad], file,
-                                       where(path.move[rows[bad]])))
+                                       where(path.move[rows[bad]]), kinematics))
     return diagnostics, extents
 
 
@@ -109,7 +109,7 @@ def extremes(path: JointPath, moves: Moves, control: Control, kinematics: Callab
 
 
 def _excess(path: JointPath, moves: Moves, control: Control, j: int, bad: Ints, low: Floats, high: Floats, over: Floats,
-            file: str, where: str) -> Diagnostic:
+            file: str, where: str, kinematics: Callable[[int], Kinematics]) -> Diagnostic:
     """Axis j goes beyond its travel in the blocks `bad` (K,), to `low`, `high`, by `over` (K,), at a place."""
     machine = control.machine
     rotary = machine.rotary[j]
@@ -125,7 +125,8 @@ def _excess(path: JointPath, moves: Moves, control: Control, j: int, bad: Ints, 
     if rotary:
         hint = "turn the part in the set-up, or split the operation"
     elif linking:
-        hint += ", lower clearance.margin, or use a shorter tool (gauge_length)"
+        long = kinematics(int(moves.tool[path.move[worst]])).tool_length > 0.0
+        hint += ", lower clearance.margin, or use a shorter tool (gauge_length)" if long else ", or lower clearance.margin"
     return error("travel.exceeded", f"axis {machine.axis_names[j]} goes to {value * unit:.4f} {name}{linking}{where}, "
                  f"allowed {lower:.4f} to {upper:.4f} {name}", file=file,
                  lines=[first, *(n for n in lines[:6].tolist() if n != first)], count=len(lines), hint=hint)

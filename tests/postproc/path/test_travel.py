@@ -107,6 +107,14 @@ def test_tool_length_counts() -> None:
         assert result.ok == fits and ("travel.exceeded" in codes(result.diagnostics)) != fits
 
 
+@pytest.mark.parametrize(("length", "advised"), [(None, False), (30.0, True)])
+def test_a_shorter_tool_is_advised_where_the_tool_has_a_length(length: float | None, advised: bool) -> None:
+    setup = SetupFile.model_validate({"tools": {"1": {"gauge_length": length}} if length else {}})
+    result = convert(toolpath("RAPID", "GOTO/0,0,390", "GOTO/1,0,390", "RAPID", "GOTO/1,0,420"), "mill-3axis", setup=setup)
+    hints = [d.hint for d in result.diagnostics if d.code == "travel.exceeded" and "in a linking move" in d.message]
+    assert hints and all(("shorter tool" in hint) == advised for hint in hints)
+
+
 def test_rotary_travel_in_degrees() -> None:
     """A head-table machine tilts to 110 degrees."""
     path = toolpath("RAPID", *goto([[0, 0, 50], [0, 0, 40]], [tilted(115, 0), tilted(115, 0)]))
