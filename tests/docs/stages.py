@@ -177,14 +177,16 @@ def stages() -> dict[str, Stage]:
     """What pages need besides those of `shop`, by their places in the project; made when a page is run."""
     return {
         "README.md": Stage(
-            files={"shop.toml": "", **{f"samples/{name}.cls": part(1) for name in ("pocket", "five_faces")}},
+            files={"shop.toml": "", "part.cls": part(2),
+                   **{f"samples/{name}.cls": part(1) for name in ("pocket", "five_faces")}},
             copies={"measurements.toml": "samples/calibration/reversal.toml",
                     "reversal.csv": "samples/calibration/reversal.csv",
                     **{f"samples/{name}": f"samples/{name}" for name in ("tools.setup.toml", "batch")},
                     **{f"mikron-ucp710-{axis}.csv": f"samples/errors/mikron-ucp710-{axis}.csv" for axis in "XYZ"}},
             before={"time part.ngc -m mikron-ucp710 -c linuxcnc --calibrate": partial(logged, "part.ngc", "linuxcnc"),
                     "place": _placed},
-            instead={"setup new part.cls": "setup new part.cls --yes", "-j 4": "-j 1",
+            instead={"setup new part.cls": "setup new part.cls --yes", "-j 4": "-j 1", "--pass 3": "--pass 1",
+                     "--line 40": "--line 15",
                      " --figures pictures": "", "-m trunnion-bc -c fanuc-30i": "-c fanuc-30i",
                      "orient part.cls": "orient part.cls --max-tilt 5", "--orient auto": "--orient auto --max-tilt 5"}),
         "docs/how-to/calibrate-the-time.md": Stage(  # so small a part leaves nothing to measure: test every move

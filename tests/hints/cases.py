@@ -28,3 +28,8 @@ from tests.hints.verify_cases import VERIFY
 
 CASES = [*CL, *IMPORTS, *CL_WORDS, *MACHINE, *TOOLS, *CONVERT, *GCODE, *ERRORS, *FILE, *ALIGN, *PLACE, *VERIFY, *EXCHANGE,
          *OWN_ROOMS, *MACROS, *BATCH, *DESIGN, *PACKAGES, *CALIBRATION, *RARE, *PASSED_ON, *PASSED_LATE, *ORIENT]
+_NUMBERED = {f"{case.code}-{k}": case for k, case in enumerate(CASES)}
+OF_MACHINES = {name: case for name, case in _NUMBERED.items()
+               if case.command.split()[0] in ("machine", "errors", "calibrate")}
+OF_PROGRAMS = {name: case for name, case in _NUMBERED.items() if name not in OF_MACHINES}
+"""by their names"""

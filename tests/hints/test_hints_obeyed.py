@@ -15,7 +15,7 @@ from postproc.cycle_time import conversion
 from tests.explained_codes import DATA
 from tests.hints.call_cases import CALLS, CallCase
 from tests.hints.case import HintCase, called
-from tests.hints.cases import CASES
+from tests.hints.cases import CASES, OF_PROGRAMS
 from toolpaths.diagnostics import REPORT, Severity
 
 EXPLAINED = tomllib.loads((DATA / "codes.toml").read_text("utf-8"))
@@ -61,8 +61,13 @@ def test_a_hint_to_who_calls_the_package_is_obeyed(case: CallCase, tmp_path: Pat
     assert [str(d) for d in after if d.code == case.code or d.severity is Severity.ERROR] == []
 
 
-@pytest.mark.parametrize("case", CASES, ids=[f"{c.code}-{k}" for k, c in enumerate(CASES)])
+@pytest.mark.parametrize("case", OF_PROGRAMS.values(), ids=OF_PROGRAMS)
 def test_a_hint_obeyed_is_the_end_of_its_fault(case: HintCase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    is_obeyed(case, tmp_path, monkeypatch)
+
+
+def is_obeyed(case: HintCase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Said for the fault, and neither it nor another error is said when it was obeyed."""
     monkeypatch.chdir(tmp_path)
     if case.packages:
         monkeypatch.syspath_prepend(str(tmp_path))
