@@ -105,7 +105,7 @@ def logged(file: str, controller: str) -> None:
 def tables() -> dict[str, str]:
     """The CSV tables that the page of error models shows, by the names in their first lines."""
     text = (ROOT / "docs/reference/error-models.md").read_text("utf-8")
-    return dict(re.findall(r"```csv\n# (\S+\.csv)\n(.*?)\n```", text, re.DOTALL))
+    return dict(re.findall(r"```text\n# (\S+\.csv)\n(.*?)\n```", text, re.DOTALL))
 
 
 def sheet() -> str:

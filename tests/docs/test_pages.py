@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 import pytest
+from pygments.lexers import get_lexer_by_name
 from typer.main import get_command
 
 from machines.geometric_error.exchange import survey
@@ -176,3 +177,11 @@ def test_codes_of_messages_on_pages_are_such_as_there_are() -> None:
              for code in re.findall(r"`([a-z-]+\.[a-z_-]+)`", row)]
     groups = get_args(PlugInGroup)  # names of that form that are no codes
     assert len(named) >= 8 and [each for each in named if each[1] not in known and each[1] not in groups] == []
+
+
+def test_blocks_are_of_languages_that_the_documentation_colours() -> None:
+    """Sphinx warns of others, and a warning ends the documentation."""
+    kinds = {block.kind for page in PAGES for block in blocks(page.read_text("utf-8"))} - {""}
+    assert len(kinds) >= 4
+    for kind in kinds:
+        get_lexer_by_name(kind)

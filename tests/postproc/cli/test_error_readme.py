@@ -22,7 +22,7 @@ TEXT = "".join((ROOT / page).read_text("utf-8") for page in PAGES)
 SAMPLES = ROOT / "samples/errors"
 COMMANDS = [line.split("#")[0].strip() for block in re.findall(r"```sh\n(.*?)```", TEXT, re.DOTALL)
             for line in block.splitlines() if line.startswith("postproc")]
-TABLES = dict(re.findall(r"```csv\n# (\S+\.csv)\n(.*?)```", TEXT, re.DOTALL))
+TABLES = dict(re.findall(r"```text\n# (\S+\.csv)\n(.*?)```", TEXT, re.DOTALL))
 MODELS = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)
 ADJACENT = {"x.comp": "-100 -100.002 -100.001\n0 0 0.001\n100 100.003 100.004\n",
             "y.csv": "Y [mm],EYY [um],EXY [um]\n-200,0,1\n200,4,2\n", "x.csv": "X [mm],EXX [um]\n-300,0\n300,4\n"}
