@@ -29,15 +29,22 @@ def cutter_end(tool: Tool | None) -> CutterEnd | None:
     """
     if tool is None or tool.diameter is None or tool.corner_radius is None or tool.diameter <= 0.0:
         return None
-    if "DRILL" in tool.shape.upper() or "TAP" in tool.shape.upper():
-        return None
     radius, half = tool.corner_radius, 0.5 * tool.diameter
-    flat, above, slope = half - radius, radius, 0.0
-    if len(tool.cutter) == _APT and (tool.cutter[2] or tool.cutter[3]):
-        flat, above, slope = tool.cutter[2], tool.cutter[3], tool.cutter[4]
-    if slope or radius < 0.0 or flat < -_SAME * half or abs(above - radius) > _SAME * half:
+    flat, above, slope = _corner(tool, radius, half)
+    if _makes_holes(tool) or slope or radius < 0.0 or flat < -_SAME * half or abs(above - radius) > _SAME * half:
         return None
     return CutterEnd(flat if flat > _SAME * half else 0.0, radius)
+
+
+def _makes_holes(tool: Tool) -> bool:
+    return "DRILL" in tool.shape.upper() or "TAP" in tool.shape.upper()
+
+
+def _corner(tool: Tool, radius: float, half: float) -> tuple[float, float, float]:
+    """(mm from the axis to the centre of the corner, mm above the tip, degrees that the end slopes by)."""
+    if len(tool.cutter) == _APT and (tool.cutter[2] or tool.cutter[3]):
+        return tool.cutter[2], tool.cutter[3], tool.cutter[4]
+    return half - radius, radius, 0.0
 
 
 def ball_radius(tool: Tool | None) -> float | None:
@@ -50,11 +57,11 @@ def ball_radius(tool: Tool | None) -> float | None:
     """
     if tool is None or tool.diameter is None:
         return None
-    if "DRILL" in tool.shape.upper() or "TAP" in tool.shape.upper():
+    if _makes_holes(tool):
         return 0.0
     if tool.corner_radius is None:
         return None
     radius, half = tool.corner_radius, 0.5 * tool.diameter
-    adjacent, above = tool.cutter[2:4] if len(tool.cutter) == _APT else (0.0, 0.0)
-    off = max(abs(adjacent), abs(above - radius)) if adjacent or above else abs(radius - half)
+    flat, above, _ = _corner(tool, radius, half)
+    off = max(abs(flat), abs(above - radius))
     return radius if half > 0.0 and radius > 0.0 and off <= _SAME * radius else 0.0

@@ -37,7 +37,7 @@ import orientation as samples  # found on the path set above
 
 CYCLE = 1e-3
 TOOLS = {int(number): (tool.gauge_length or 0.0, 6.0) for number, tool in tool_setup().tools.items()}
-SAMPLED = {"bicubic": "mikron-ucp710", "five_tilted": "mikron-ucp710", "saddle": "mikron-ucp710", "pocket": "mill-3axis"}
+SAMPLED = {"bicubic": "mikron-ucp710", "five_tilted": "mikron-ucp710", "pocket": "mill-3axis"}
 Make = Callable[[FeedSource], PostResult]
 
 
@@ -55,8 +55,7 @@ def paths() -> dict[str, Make]:
     corner = toolpath("RAPID", "GOTO/0,0,50", "FEDRAT/MMPM,6000", "GOTO/80,0,50", "GOTO/80,60,50", "GOTO/20,60,40")
     found["lines and corner"] = lambda feed: converted(corner, "mill-3axis", feed)
     for name, of in SAMPLED.items():
-        if (SAMPLES / f"{name}.cls").exists():
-            found[name] = lambda feed, name=name, of=of: converted(toolpaths.read(SAMPLES / f"{name}.cls")[0], of, feed)
+        found[name] = lambda feed, name=name, of=of: converted(toolpaths.read(SAMPLES / f"{name}.cls")[0], of, feed)
     return found
 
 

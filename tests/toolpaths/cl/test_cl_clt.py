@@ -50,7 +50,8 @@ def test_turns_about_two_axes_follow_each_other() -> None:
 
 @pytest.mark.parametrize("axis", ["0.0,1.0,0.0", "0.0,0.0,1.0"])
 def test_an_axis_that_contradicts_rotabl_is_refused(axis: str) -> None:
-    read(feature(axis, (math.pi / 2, 0.0, 0.0), "GOTO/ 1.0,2.0,3.0 \n"), "cl.tlaxis")
+    found = read(feature(axis, (math.pi / 2, 0.0, 0.0), "GOTO/ 1.0,2.0,3.0 \n"), "cl.tlaxis").diagnostics
+    assert [d.severity for d in found if d.code == "cl.tlaxis"] == [Severity.ERROR]
 
 
 def unclosed(text: str) -> str:
@@ -107,8 +108,9 @@ def test_cycle_on_before_a_cycle_arms_nothing() -> None:
 
 
 def test_cycle_on_before_a_point_needs_a_cycle() -> None:
-    read(feature("0.0,0.0,1.0", (0.0, 0.0, 0.0), f"CYCLE/ ON \nGOTO/ 0.0,0.0,0.0 \n{DRILL}GOTO/ 1.0,0.0,0.0 \n"
-                 "CYCLE/ OFF \n"), "cl.cycle")
+    found = read(feature("0.0,0.0,1.0", (0.0, 0.0, 0.0), f"CYCLE/ ON \nGOTO/ 0.0,0.0,0.0 \n{DRILL}GOTO/ 1.0,0.0,0.0 \n"
+                         "CYCLE/ OFF \n"), "cl.cycle").diagnostics
+    assert [d.severity for d in found if d.code == "cl.cycle"] == [Severity.ERROR]
 
 
 def test_features_are_operations_and_tools_without_numbers_are_named_and_loaded() -> None:
