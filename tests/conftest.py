@@ -12,6 +12,7 @@ from tests import (
     compile_once,
     cover,
     environment,
+    few_messages,
     machines_once,
     one_command,
     processor_time,
@@ -54,13 +55,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.linuxcnc)
 
 
-def pytest_collection_finish() -> None:
+def pytest_collection_finish(session: pytest.Session) -> None:
     """What stays until the end is not looked through by each collection of garbage, and there are fewer of them."""
     gc.freeze()
     gc.set_threshold(100_000, 50, 100)
     gc.enable()
     compile_once.install()
     one_command.install()
+    few_messages.install(session.config)
 
 
 @cache
