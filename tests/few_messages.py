@@ -1,7 +1,8 @@
 """Workers tell what the whole run needs: steps that passed before and behind a test are no news to it.
 
-A test is six messages of its worker: that it begins, how setting up, the test and taking down went, that it ends, twice. What
-began, and what passed around the test, changes nothing that is printed or counted; `--durations` and `--junitxml` look at it.
+A test is six messages of its worker: that it begins, how setting up, the test and taking down went, that it ends, twice.
+What began, and what passed around the test, changes nothing that is printed or counted; `--durations` and `--junitxml` look
+at it.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from toolpaths.cl.text.source import normalise
 from toolpaths.diagnostics import Severity, has_errors
 from toolpaths.toolpath import FeedMode, Toolpath
 
-# Numbers and texts of the project's own source are no likelier faults: hypothesis parses all of it, in each worker, for them.
+# Constants of the project's own source are no likelier faults; hypothesis parses all of it, in each worker, for them.
 providers.is_local_module_file = lambda file: False
 SLOW = settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 number = st.one_of(st.integers(-500, 500).map(str), st.floats(-1e4, 1e4).map(lambda x: f"{x:.4f}"),
