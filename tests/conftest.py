@@ -29,9 +29,10 @@ from tests.processor_time import (
     pytest_testnodedown,
 )
 from tests.said import pytest_runtest_call
+from tests.together import pytest_xdist_make_scheduler
 
 __all__ = ["environment", "lengths_looked_at_where_they_are_seen", "pytest_runtest_call", "pytest_runtest_protocol",
-           "pytest_sessionfinish", "pytest_terminal_summary", "pytest_testnodedown"]
+           "pytest_sessionfinish", "pytest_terminal_summary", "pytest_testnodedown", "pytest_xdist_make_scheduler"]
 
 # Files that are imported make no garbage worth looking for.
 gc.disable()
