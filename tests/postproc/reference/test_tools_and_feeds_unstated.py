@@ -164,6 +164,15 @@ def test_a_tool_that_the_file_numbers_and_never_loads_is_refused() -> None:
     assert "(T2)" in found.message and converted(NUMBERED.replace("MILL,6,0\n", "MILL,6,0\nLOADTL/2\n")).ok
 
 
+@pytest.mark.parametrize(("controller", "written"), [("haas-ngc", "T0\n"), ("heidenhain-tnc640", "TOOL DEF 0\n")])
+def test_an_empty_place_is_not_made_ready_before_a_tool(controller: str, written: str) -> None:
+    """SELECT/TOOL,0 was written as T0, which takes the tool out of the spindle where a word T calls it at once."""
+    text = f"UNITS/MM\nSPINDL/900,RPM,CLW\nFEDRAT/400\nLOADTL/1\nSELECT/TOOL,0\n{CUT}LOADTL/2\nSPINDL/900,RPM,CLW\n{CUT}"
+    assert written not in converted(text, controller=controller).text
+    assert written.replace("0", "2") in converted(text.replace("TOOL,0", "TOOL,2"), controller=controller).text
+    assert written in converted(text + "SELECT/TOOL,0\nGOHOME\nLOADTL/0\n", controller=controller).text
+
+
 def test_names_that_the_file_does_not_have_are_reported() -> None:
     found = said(converted(TWO, of=setup(tool_numbers={**NAMES, "BALL8": 3})), "setup.tool_name_unused")
     assert "BALL8" in found.message and "EM12, EM6" in found.hint
