@@ -182,10 +182,6 @@ def test_other_channels_are_left_out(tmp_path: Path) -> None:
     assert machine is not None and machine.structure == "w C' A' b X Y Z (C1) t"
 
 
-def test_kinematics_of_a_tnc_are_refused_in_one_line(tmp_path: Path) -> None:
-    assert imported(tmp_path, "CfgKinSimpleAxis (key:=\"A\")\n") == (None, ["ERROR import.format 0"])
-
-
 def test_a_transformation_that_lacks_an_axis_is_one_fault(tmp_path: Path) -> None:
     """That nothing else says where the axes are is no second one."""
     (tmp_path / "m.arc").write_text(AXES.format(first="A", second="C") + "N24100 $MC_TRAFO_TYPE_1=24\n")
