@@ -61,7 +61,7 @@ def _form_of(path: Path, text: str) -> MachineForm | None:
         return "freecad"
     if any(word in text for word in ("[KINS]", "[TRAJ]", "[EMC]", "#INCLUDE")):
         return "linuxcnc-ini"
-    if any(word in text for word in ("$MA_", "$MC_", "$TC_CARR")):
+    if any(word in text.upper() for word in ("$MA_", "$MC_", "$TC_CARR", "$NK_")):
         return "siemens"
     if is_description_table(text) or re.search(_UNPUBLISHED[0][0], text) or re.search(_UNPUBLISHED[1][0], text):
         return "heidenhain"

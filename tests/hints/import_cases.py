@@ -23,6 +23,9 @@ TABLE_530 = "KEY AXIS COORD\nMachAxis X\nMachAxis Y\nMachAxis Z\nTrans Z -500\nM
 IMPORTS = [
     _case("import.line", r"write (\$NAME\[index\] = value)", TABLE + "$MA_MAX_AX_VELO(X1)=30000\n",
           Edit("shop.ini", "(X1)", "[X1]")),
+    _case("import.default", "(lines) that are not 0 there", TABLE, Edit("shop.ini", "", "".join(
+        f"$MC_TRAFO5_{name}_1[{k}]=0\n" for name, k in [("AXIS1", 1), ("AXIS1", 2), ("BASE_TOOL", 0), ("BASE_TOOL", 1), *(
+            ("JOINT_OFFSET", k) for k in range(3))]))),
     _case("import.fine", "add them to the vectors", RECORD, Edit("shop.ini", "=-600\n$TC_CARR46[1]=0.004", "=-599.996")),
     _case("import.unit", "write one of (mm),", XYZ.replace("UNITS = mm", "UNITS = elle"), Edit("shop.ini", "elle", r"\1")),
     _case("import.geometry", r"STRUCTURE = (w A' b X Y Z \(C1\) t), POINT_A = (0 0 0)",
