@@ -147,8 +147,9 @@ class _IniMachine:
             names, files = ", ".join(self.unset), ", ".join(entry.value for entry in self.hal.unread)
             first, values = next(iter(self.unset)), ", ".join(f"{value:g}" for value in self.unset.values())
             some = len(self.unset) > 1
-            self.draft.warning("import.pin", f"{names} {'are' if some else 'is'} set nowhere in what was read, so LinuxCNC's "
-                               f"{values} {'count' if some else 'counts'}; {files} was not read", self.hal.unread[0].line,
+            self.draft.warning("import.pin", f"{names} {'are' if some else 'is'} set nowhere in what was read, so "
+                               f"LinuxCNC's {values} {'count' if some else 'counts'}; {files} was not read",
+                               self.hal.unread[0].line,
                                f"compare with halcmd getp {first}, and state what differs: --set {first}=VALUE")
 
     def _line(self, section: str, key: str) -> tuple[int, str, str]:

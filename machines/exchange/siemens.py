@@ -113,9 +113,9 @@ class _SiemensMachine:
         """Nothing that is read says where the rotary axes are: one cause, by what the file has in its place."""
         chain = next((one for (name, _), one in self.data.data.items() if name.startswith(("NK_", "NT_"))), None)
         if self.unread is not None:
-            self.draft.error("import.kinematics", f"{self.unread.said}: of the 5-axis transformations types 24, 40, 56, 16 to "
-                             "21 and 32 to 35 are read; of 48 to 51 no document at hand says which vector goes to the table",
-                             self.unread.line, _HINT)
+            self.draft.error("import.kinematics", f"{self.unread.said}: of the 5-axis transformations types 24, 40, 56, 16 "
+                             "to 21 and 32 to 35 are read; of 48 to 51 no document at hand says which vector goes to the "
+                             "table", self.unread.line, _HINT)
         elif chain is not None:
             self.draft.error("import.kinematics", f"{chain.said}: kinematic chains ($NK_..., $NT_...) are not read",
                              chain.line, _HINT)
@@ -165,7 +165,7 @@ class _SiemensMachine:
         base, joint = self._vector(f"MC_TRAFO5_BASE_TOOL_{n}"), self._joint(carried, n)
         vectors = (self.data.vector(f"MC_TRAFO5_AXIS1_{n}")[0], self.data.vector(f"MC_TRAFO5_AXIS2_{n}")[0])
         if not any(vectors[0]) or not self._plain(n):
-            if not any(vectors[0]):
+            if not any(vectors[0]) and not has_errors(self.draft.found):
                 self.draft.error("import.geometry", f"{datum.said}, and no $MC_TRAFO5_AXIS1_{n}", datum.line, _HINT)
             return None
         self._closes(carried, base, joint, n)

@@ -173,8 +173,8 @@ def test_other_ways_to_write_the_same(tmp_path: Path) -> None:
     """Several assignments in a line, small letters, TRUE and FALSE for 1 and 0."""
     plain = imported(tmp_path, "$MN_SCALING_SYSTEM_IS_METRIC=0\n" + AC + TABLE + FIGURES)[0]
     one_line = TABLE.replace("\n$MC_TRAFO5_BASE", " $MC_TRAFO5_BASE").replace("=1\n", "=TRUE\n")
-    other = imported(tmp_path, "$MN_SCALING_SYSTEM_IS_METRIC=FALSE\n" + (AC + one_line).replace("$MC", "$mc") + FIGURES.replace(
-        "MODULO[AX6]=1", "MODULO[ax6]=TRUE"))[0]
+    other = imported(tmp_path, "$MN_SCALING_SYSTEM_IS_METRIC=FALSE\n" + (AC + one_line).replace("$MC", "$mc")
+                     + FIGURES.replace("MODULO[AX6]=1", "MODULO[ax6]=TRUE"))[0]
     assert plain is not None and other is not None and plain.turns == other.turns
     for mine, theirs in zip(plain.kinematics.chain, other.kinematics.chain, strict=True):
         np.testing.assert_array_equal([mine.point, mine.direction], [theirs.point, theirs.direction])
