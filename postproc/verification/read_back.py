@@ -22,6 +22,7 @@ from postproc.readback.comparison.options import check_options
 from postproc.readback.comparison.slow_moves import planned_feeds
 from postproc.readback.comparison.starts import check_end, check_start
 from postproc.readback.comparison.states import check_lengths, registers_of
+from postproc.readback.comparison.safe_planes import check_safe_planes
 from postproc.readback.comparison.stock import check_stock
 from postproc.readback.comparison.stops_and_dwells import check_stops
 from postproc.readback.comparison.tool_changes import check_changes
@@ -125,6 +126,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
                *check_stops(code, motion, job, faults), *check_clamps(whole, motion, job, comparison.owner, faults),
                *check_options(code, motion, job, faults), *check_index(motion, job, home, comparison.owner, faults),
+               *check_safe_planes(motion, executed, job, home, comparison.owner, faults),
                *check_hooks(data, code, motion, job, comparison.owner, faults),
                *check_stock(data, job, faults), *_bodies(motion, executed, job, comparison, faults)]
     noted = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
