@@ -34,7 +34,7 @@ def check_safe_planes(motion: Motion, executed: BlockPoses, job: Job, home: Floa
     asked = job.setup.clearance
     about, least = (space.corners, MARGINS[-1] * asked.margin) if asked.distance is None else (space.centres, asked.distance)
     after, before = np.minimum(owner[rows], len(moves) - 1), np.maximum(owner[rows] - 1, 0)
-    again = np.linalg.norm(moves.tip[after] - moves.tip[before], axis=1) <= job.options.tolerance  # unwound, or taken up again
+    again = np.linalg.norm(moves.tip[after] - moves.tip[before], axis=1) <= job.options.tolerance  # unwound, taken up again
     rows, after, before = rows[~again], after[~again], before[~again]
     near = job.options.tolerance + executed.corrected_between(motion, rows)
     joints = np.concatenate([motion.start[None], motion.end])
@@ -55,8 +55,8 @@ def check_safe_planes(motion: Motion, executed: BlockPoses, job: Job, home: Floa
     key, share = ("margin", MARGINS[-1]) if asked.distance is None else ("distance", 1.0)
     fits = max(math.floor(10.0 * least_room / share), 1.0) / 10.0
     return [faults.warning("verify.safe_plane", f"a linking move goes aside {least_room:.3f} mm above the part, the safe "
-                           f"plane is {least:g} mm above it", 0, line, len(low), f"let it rise there first, or write {key} = "
-                           f"{fits:g} under [clearance] of the set-up")]
+                           f"plane is {least:g} mm above it", 0, line, len(low), "let it rise there first, or write "
+                           f"{key} = {fits:g} under [clearance] of the set-up")]
 
 
 def _aside(tip: Floats, lines: list[tuple[Floats, Floats, Bools]], near: Floats) -> Bools:
