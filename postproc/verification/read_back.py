@@ -14,6 +14,7 @@ from postproc.base.options import Options
 from postproc.base.progress import Progress
 from postproc.control.control import Control
 from postproc.job.job import Job
+from postproc.readback.comparison.approaches import check_safe_planes
 from postproc.readback.comparison.clamps import check_clamps, check_index
 from postproc.readback.comparison.compare import Comparison, compare
 from postproc.readback.comparison.faults import Faults
@@ -22,7 +23,6 @@ from postproc.readback.comparison.options import check_options
 from postproc.readback.comparison.slow_moves import planned_feeds
 from postproc.readback.comparison.starts import check_end, check_start
 from postproc.readback.comparison.states import check_lengths, registers_of
-from postproc.readback.comparison.safe_planes import check_safe_planes
 from postproc.readback.comparison.stock import check_stock
 from postproc.readback.comparison.stops_and_dwells import check_stops
 from postproc.readback.comparison.tool_changes import check_changes
