@@ -155,13 +155,15 @@ def test_distance_of_the_setup_is_where_the_tool_leaves_to() -> None:
             axis = poses[i][1][-1]
             level = [tip[-1] @ axis for tip, ax in poses[i + 1:i + 3] if angle(ax[-1:], axis[None])[0] < 1e-4]
             assert max(level) > 99.9
-        assert not found_under(result, 100.0) and found_under(result, 125.0) == {"verify.safe_plane"}
+        assert not found_under(result, distance=100.0) and not found_under(result, distance=None, margin=50.0)
+        for asked in ({"distance": 125.0}, {"distance": None, "margin": 1250.0}):  # of a margin a tenth at least
+            assert found_under(result, **asked) == {"verify.safe_plane"}
 
 
-def found_under(result: PostResult, distance: float) -> set[str]:
-    """What `verify` says of a program under a set-up with another safe distance."""
+def found_under(result: PostResult, **clearance: float | None) -> set[str]:
+    """What `verify` says of a program under a set-up with other safe distances."""
     assert result.job is not None
-    setup = result.setup.model_copy(update={"clearance": result.setup.clearance.model_copy(update={"distance": distance})})
+    setup = result.setup.model_copy(update={"clearance": result.setup.clearance.model_copy(update=clearance)})
     return codes(read_back(result.text, replace(result.job, setup=setup), "test.apt", gcode="p.nc")[1])
 
 
