@@ -35,6 +35,9 @@ class PlanningClock(ProgramClock, Protocol):
     def ranked(self, result: PostResult) -> ProgramTime:
         """The time without its band, near the executed control's: for a choice among dozens of programs."""
 
+    def least(self, result: PostResult) -> float:
+        """s where the control had the whole tolerance for itself; 0 where that is no bound."""
+
 
 StagedWhole = Callable[[PostResult], PostResult]
 """A conversion through all stages"""

@@ -19,7 +19,7 @@ import numpy as np
 
 from postproc.base.options import FeedModeChoice, Options, OutputMode
 from postproc.base.program_time import Optimised, OptimisedStep, ProgramTime
-from postproc.pipeline.feeds_by_clock import ProgramClock, StagedWhole, measured, ranked, with_compared_feeds
+from postproc.pipeline.feeds_by_clock import PlanningClock, ProgramClock, StagedWhole, measured, ranked, with_compared_feeds
 from postproc.pipeline.result import PostResult
 from toolpaths.dataclass import dataclass
 
@@ -33,6 +33,8 @@ LEAST = 1e-4
 """part of the time that a choice must save to be taken"""
 MUCH = 0.8
 """of the tolerance for the control's smoothing, with which each output mode is tried too"""
+LITTLE = 1e-4
+"""of the tolerance for the control's smoothing, where points are to have all of it"""
 MOST = 8
 """operations whose output mode is tried by itself: those that take longest"""
 
@@ -71,7 +73,7 @@ def optimised(start: PostResult, stages: StagedWhole, clock: ProgramClock) -> Po
         search.to(f"feed mode {mode}", _options(partial(replace, feed_mode=mode)))
     best = search.best
     made = with_compared_feeds(best.start, stages, clock) if planned and not compared else best.made
-    return replace(made, optimised=Optimised(tuple(search.steps), search.first, best.executed, search.tried))
+    return replace(made, optimised=Optimised(tuple(search.steps), search.first, best.executed, search.tried, search.least()))
 
 
 def _options(change: Callable[[Options], Options]) -> _Change:
@@ -101,6 +103,15 @@ class _Search:
                 self.steps.append(OptimisedStep(what, self.best.executed.seconds, executed.seconds))
                 self.best = _Best(start, made, time, executed)
         return time.seconds
+
+    def least(self) -> float:
+        """s that no sharing of the tolerance beats: as few blocks as all of it allows, on a control that has all of it too; 0
+        where that is not known."""
+        if not isinstance(self.clock, PlanningClock):
+            return 0.0
+        change = partial(replace, off_path=True, filled=True, smoothing=LITTLE * self.best.start.options.tolerance)
+        made = self.stages(_options(change)(self.best.start)) if self._states_smoothing() else self.best.made
+        return min(self.clock.least(made), self.best.executed.seconds) if made.ok else 0.0
 
     def modes(self) -> None:
         """Output modes, of all operations and then of each, where the shop leaves them to us."""
