@@ -54,6 +54,6 @@ def test_a_line_between_rests_takes_its_bound_on_the_control() -> None:
     """F3000 is not reached in the second line; the bound has each wait for the axes to be in position."""
     b, m = blocks(f"{HEAD}\nF3000\nG1 X40\nG4 P0.5\nG1 X45"), model("control")
     taken, least = total(b, timed(b, m)), lower_bound(b, m)
-    assert least <= taken <= 1.02 * least
+    assert least <= taken <= least + 3 * m.cycle
     without = lower_bound(b, model("ideal"))
     assert least - without > 0.3 * 2 * (50.0 / float(machine().limits.jerk[0])) ** 0.5
