@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 
-from machines.geometric_error.exchange import survey
+from machines.geometric_error.exchange import exports, survey
 from postproc.pipeline import stages
 from postproc.verification import length_limits, read_back, second_witness
 from postproc.witness.evidence import Testimony
@@ -73,6 +73,7 @@ def lengths_looked_at_where_they_are_seen(request: pytest.FixtureRequest) -> Ite
             patch.setattr(drawing, "_settle", _as_put)
             patch.setattr(drawing, "DOTS", ROUGH)
         patch.setattr(survey, "PLACES", PLACES)
+        patch.setattr(exports, "WORST_PLACES", PLACES)
         if room in ROOMS and name not in SEEN:
             patch.setattr(read_back, NAME, _none)
         if room in UNHEARD and name not in HEARD:
