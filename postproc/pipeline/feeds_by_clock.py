@@ -56,7 +56,8 @@ def ranked(clock: ProgramClock, made: PostResult) -> ProgramTime:
 
 def with_compared_feeds(start: PostResult, stages: StagedWhole, clock: ProgramClock | None) -> PostResult:
     """The program with planned feeds, and what they do; the programmed feeds where the control makes its ramps itself and
-    planned ones take longer, unless tools or motors have limits that only planned feeds keep. Other conversions as they are."""
+    planned ones take longer, unless tools or motors have limits that only planned feeds keep. Other conversions as they
+    are."""
     made = stages(start)
     if clock is None or start.options.feed != "planned" or not made.ok or made.motion is None or not made.motion.passes:
         return made
