@@ -8,6 +8,7 @@ from the next rest: the largest such sum.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,9 @@ from postproc.cycle_time.lookahead import rest_to_rest
 from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.shape import Shape, axis_limit
 from toolpaths.arrays import Bools, Floats, Ints
+
+_Law = Callable[[Floats, Floats, Floats, Floats], Floats]
+"""Least times from travel, velocity, acceleration and jerk"""
 
 
 class Stretches(NamedTuple):
@@ -64,7 +68,7 @@ def rest_ramps(blocks: MotionBlocks, form: Shape, model: CycleTimeModel, seconds
     off = _off(blocks, model, rests)
     ends = [(blocks.end - blocks.start[first][some.of], np.arange(len(blocks)) == first[some.of], before, off),
             (blocks.end[last][some.of] - blocks.start, np.arange(len(blocks)) == last[some.of], behind,
-             np.concatenate([off[:1] * 0.0, off[:-1]]))]
+             np.concatenate([np.zeros_like(off[:1]), off[:-1]]))]
     gains = []
     for travel, next_to, spent, slack in ends:
         known = np.ones(len(blocks), dtype=bool) if model.corner_step is None and model.off is None else next_to
@@ -95,12 +99,11 @@ def _off(blocks: MotionBlocks, model: CycleTimeModel, rests: Bools) -> Floats:
     return np.asarray(off[:, None] / blocks.arms)
 
 
-def _slowest(travel: Floats, most: Floats, acceleration: Floats, jerk: Floats, law: object = from_rest) -> Floats:
-    """(N,) s of the slowest axis over (N, A) travel at speeds up to `most` (N, A)."""
+def _slowest(travel: Floats, most: Floats, acceleration: Floats, jerk: Floats, law: _Law = from_rest) -> Floats:
+    """(N,) s of the slowest axis over (N, A) travel at speeds up to `most` (N, A), by a law of one axis."""
     moves = (travel > 0.0) & (most > 0.0)
-    shaped = (np.where(moves, travel, 1.0), np.where(moves, most, 1.0), np.broadcast_to(acceleration, travel.shape),
-              np.broadcast_to(jerk, travel.shape))
-    found = from_rest(*shaped) if law is from_rest else rest_to_rest(*shaped)
+    limits = (np.broadcast_to(limit, travel.shape) for limit in (acceleration, jerk))
+    found = law(np.where(moves, travel, 1.0), np.where(moves, most, 1.0), *limits)
     return np.asarray(np.where(moves, found, 0.0).max(axis=1, initial=0.0))
 
 
