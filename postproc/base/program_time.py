@@ -103,8 +103,8 @@ class OptimisedStep:
 class Optimised:
     """What `--optimise` came to: choices taken in order, time without it and with it, number of choices tried.
 
-    `least`: s that no sharing of the tolerance beats (the control and the program's points with all of it each), 0 where that
-    is not known.
+    `least`: s that no sharing of the tolerance beats (the control and the program's points with all of it each), 0 where
+    that is not known.
     """
 
     steps: tuple[OptimisedStep, ...]
