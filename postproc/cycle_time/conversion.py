@@ -80,7 +80,8 @@ class ControlClock:
         if planner.kind != "linuxcnc":
             return 0.0
         blocks = from_conversion(result)
-        whole = np.where(np.isfinite(blocks.tolerance), np.maximum(blocks.tolerance, result.options.tolerance), blocks.tolerance)
+        stated = blocks.tolerance
+        whole = np.where(np.isfinite(stated), np.maximum(stated, result.options.tolerance), stated)
         return self._time(result, planner, False, replace(blocks, tolerance=whole)).seconds
 
     def plan(self, made: PostResult) -> ControlPlan | None:
