@@ -21,7 +21,7 @@ import numpy as np
 from postproc.cycle_time.blocks import CornerMode, MotionBlocks
 from postproc.cycle_time.linuxcnc_kernels import speeds
 from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, merge
-from postproc.cycle_time.lookahead import rest_to_rest
+from postproc.cycle_time.lookahead import rest_to_rest, rests
 from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.phases import ramps
 from postproc.cycle_time.shape import Shape, axis_limit, shape
@@ -60,8 +60,6 @@ def lower_bound(blocks: MotionBlocks, model: CycleTimeModel) -> float:
 def must_rest(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> Bools:
     """(E,) at whose end the axes rest: by command, and by the rules of the control that is modelled."""
     if model.kind in EXECUTED and len(blocks):
-        from postproc.cycle_time.control import rests  # SciPy, which other models do without
-
         return rests(blocks, form)
     return blocks.forced
 
@@ -145,8 +143,8 @@ class Stretches(NamedTuple):
 def from_rest(travel: Floats, velocity: Floats, acceleration: Floats, jerk: Floats) -> Floats:
     """Least time to be `travel` away from a rest, however fast there; arguments of one shape, or broadcast to it.
 
-    Jerk J alone, x = J t^3/6, then acceleration A. Beyond the whole ramp to V, which takes V/A + A/J or 2 sqrt(V/J), no motion
-    is ahead of it: what V is above the speed falls by -J t at first and no faster than -sqrt(2 J w) at last.
+    Jerk J alone, x = J t^3/6, then acceleration A. Beyond the whole ramp to V, which takes V/A + A/J or 2 sqrt(V/J), no
+    motion is ahead of it: what V is above the speed, w, falls by -J t at first and no faster than -sqrt(2 J w) at last.
     """
     rise = acceleration / jerk
     near, speed = acceleration * rise**2 / 6.0, 0.5 * acceleration * rise
