@@ -50,6 +50,11 @@ def names_of(form: PivotForm, table: tuple[str, ...], head: tuple[str, ...]) -> 
                                'write form = "machine" and a point of each line') from None
 
 
+def _spelt(name: str) -> str:
+    """A name without what people leave out or add: "Trans2", "MRZP Second"."""
+    return "".join(name.split()).upper()
+
+
 def points_of(form: PivotForm, table: tuple[str, ...], head: tuple[str, ...],
               given: Mapping[str, tuple[float, float, float]]) -> tuple[dict[str, Floats], list[str]]:
     """A point of each axis, mm, machine coordinates, and what is wrong with the numbers.
@@ -58,11 +63,14 @@ def points_of(form: PivotForm, table: tuple[str, ...], head: tuple[str, ...],
     """
     chains = names_of(form, table, head)
     wanted = [name.strip("()") for chain in chains for name in chain]
+    plain = {_spelt(name): name for name in wanted}
+    given = {plain.get(_spelt(name), name): vector for name, vector in given.items()}
     wrong = [f"{name} is not a name of {form}: it has {', '.join(wanted)}"
              for name, vector in given.items() if name not in wanted and (name not in _SWIVEL or any(vector))]
     missing = [name for chain in chains for name in chain if name not in given and "(" not in name and name != "MRZP second"]
     if missing:
-        return {}, [*wrong, f"{', '.join(missing)} missing: X, Y and Z in mm"]
+        lacks = f"{', '.join(missing)} missing: X, Y and Z in mm"
+        return {}, [f"{'; '.join(wrong)}; {lacks}" if wrong else lacks]
     points = dict[str, Floats]()
     at = np.zeros(3)
     for chain, letters in zip(chains[::-1], (head[::-1], table), strict=True):
