@@ -280,7 +280,8 @@ _ELSE = f"a machine with more travel, {_SHORTER}or a file for each side of the p
 def _not_fitted(fit: Fit) -> list[Diagnostic]:
     """Why no place fits, next to what stands against the first."""
     errors = [d for d in fit.result.diagnostics if d.severity is Severity.ERROR]
-    said = [info("place.found", f"{fit.tried} place{'s' * (fit.tried > 1)} tried, none is possible"
+    tried = fit.nowhere or f"{fit.tried} place{'s' * (fit.tried > 1)} tried, none is possible"
+    said = [info("place.found", tried
                  + "".join(f"; {why}" for why in fit.lacks[:3]),
                  hint=_ELSE if any(tool.gauge_length for tool in fit.setup.tools.values()) else _ELSE.replace(_SHORTER, ""))]
     said = said if fit.tried > 1 or fit.lacks else []

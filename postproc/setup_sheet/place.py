@@ -67,7 +67,8 @@ class Fit:
     Attributes:
         place: None where [part] is that of the set-up
         tried: places that were converted
-        lacks: of attitudes in which no place fits, why
+        lacks: of attitudes in which no place fits, why; what lacks least first
+        nowhere: what was looked at, where that shows that no place is inside travel
     """
 
     setup: SetupFile
@@ -75,6 +76,7 @@ class Fit:
     place: FoundPlace | None
     tried: int
     lacks: tuple[str, ...]
+    nowhere: str = ""
 
 
 def fitted(toolpath: Toolpath, machine: Machine, controller: str | Path, setup: SetupFile, options: Options,
@@ -100,7 +102,18 @@ def fitted(toolpath: Toolpath, machine: Machine, controller: str | Path, setup: 
             return Fit(placed_at(setup, place), result, place, tried, tuple(lacks))
         if tried > _PROOFS:
             break
-    return Fit(placed_at(setup, begin), first, begin, tried, tuple(lacks))
+    nowhere = _nowhere(machine, attitudes) if tried == 1 and lacks and origin is None else ""
+    return Fit(placed_at(setup, begin), first, begin, tried, tuple(lacks), nowhere)
+
+
+def _nowhere(machine: Machine, attitudes: list[Attitude]) -> str:
+    """What has been looked at where no attitude had a place: of slides along lines all places at once, by a linear
+    program, so that it is proved; "" for other machines and where no attitude is reached."""
+    count = min(sum(one.unreachable == 0.0 for one in attitudes), _ATTITUDES)
+    if count == 0 or not machine.kinematics.straight_slides:
+        return ""
+    some = f"each of the {count} attitudes" if count > 1 else "the one attitude"
+    return f"wherever the part stands, in {some} looked at it is outside travel"
 
 
 def below_origin(fit: Fit) -> float:
@@ -153,7 +166,8 @@ def found_place(result: PostResult, toolpath: Toolpath) -> list[Diagnostic]:
     if place is None:
         reached = any(one.unreachable == 0.0 for one in attitudes)
         other = "a machine with more travel" if reached else "a machine whose rotary axes reach them"
-        return [_note("no place of the part was found that travel allows" + "".join(f"; {why}" for why in lacks[:3]),
+        said = _nowhere(result.machine, attitudes) or "no place of the part was found that travel allows"
+        return [_note(said + "".join(f"; {why}" for why in lacks[:3]),
                       f"{other}, or a file for each side of the part")]
     p = place.part
     origin, x, y = ([round(v, 9) for v in vector] for vector in (p.origin, p.x_axis, p.y_axis))
@@ -188,12 +202,14 @@ def _places(toolpath: Toolpath, machine: Machine, setup: SetupFile, options: Opt
     if work is None:
         return
     space = _space(work, setup, machine)
+    known = dict[str, float]()
     for one in reached[:_ATTITUDES]:
-        place, why = _deepest(work, space, one, setup.joints.singular_distance)
+        place, margin, why = _deepest(work, space, one, setup.joints.singular_distance)
         if place is not None:
             yield place
-        elif why not in lacks:
-            lacks.append(why)
+        else:
+            known[why] = max(margin, known.get(why, -np.inf))
+            lacks[:] = sorted(known, key=lambda reason: -known[reason])
 
 
 def _space(work: PassContext, setup: SetupFile, machine: Machine) -> Space:
@@ -211,23 +227,23 @@ def _space(work: PassContext, setup: SetupFile, machine: Machine) -> Space:
                     (safe.corners.min(axis=0), safe.corners.max(axis=0)))
 
 
-def _deepest(work: PassContext, space: Space, one: Attitude, least: float) -> tuple[FoundPlace | None, str]:
-    """The place of most margin in an attitude, or why there is none."""
+def _deepest(work: PassContext, space: Space, one: Attitude, least: float) -> tuple[FoundPlace | None, float, str]:
+    """The place of most margin in an attitude with that margin, mm, or why there is none (-inf where none is known)."""
     angles = angles_of(one.turn)
     region, refused = region_of(work, space, angles, least)
     if region is None:
-        return None, str(refused)
+        return None, -np.inf, str(refused)
     try:
         place, margin, lack = region.deepest(*_room(work, space, one))
     except ArithmeticError as fault:
-        return None, str(fault)
+        return None, -np.inf, str(fault)
     if not margin >= 0.0:
-        return None, f"at best {lack}"
+        return None, -np.inf if np.isnan(margin) else margin, f"at best {lack}"
     if margin > _ROUND:
         near = np.round(place)
         at = float(region.margins(near[None, :])[0])
         place, margin = (near, at) if at >= 0.0 else (place, margin)
-    return FoundPlace(_part(one, place[:ANGLES]), one, margin), ""
+    return FoundPlace(_part(one, place[:ANGLES]), one, margin), margin, ""
 
 
 def _platform_to_tip(work: PassContext) -> Floats:

@@ -22,6 +22,7 @@ _OTHER = re.compile(rb"^(?!" + _USUAL + rb")(?!" + _PLAIN + rb"$)[^\n]*", re.MUL
 _COMMENT = re.compile(rb"\$\$[^\n]*")
 _GOES_ON = re.compile(rb"(?<!\$)\$(?!\$)([^\n]*)\n(?:[ \t]*\n)*")
 _SUBROUTINE = re.compile(rb"^[ \t]*DEFSUB[ \t]*/([^\n$]*)\n(.*?)^[ \t]*ENDSUB[^\n]*$", re.MULTILINE | re.DOTALL)
+_CARD, _LETTERS = re.compile(rb"[A-Za-z ]{0,4}\d{4,8}"), b" ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
 _CALL = re.compile(rb"^[ \t]*CALSUB[ \t]*/([^\n$]*)$", re.MULTILINE)
 _CATIA = re.compile(rb"^[ \t]*\$\$\*CATIA0[^\n]*\n[ \t]*\$\$[^\n]*\n((?:[ \t]*\$\$[^\n]*\n){3})", re.MULTILINE)
 _MAJOR = re.compile(r"(\$\$->\s*[\w-]+|[^/]*)/?(.*)", re.DOTALL)
@@ -140,13 +141,25 @@ def _lines_of_points(text: bytes, spans: list[tuple[int, int]], real: Array, end
 
 def _plain(data: bytes) -> bytes:
     """ASCII with LF, without comments but data comments at the start of a line, continued lines joined by JOIN."""
-    data = without_carriage_returns(data)
+    data = _without_cards(without_carriage_returns(data))
     if b"*CATIA0" in data:
         data = _CATIA.sub(_catia_system, data)
     if b"$" not in data:
         return data
     data = _COMMENT.sub(_without_comment, data)
     return _joined(data) if b"$" in data else data
+
+
+def _without_cards(data: bytes) -> bytes:
+    """A deck of cards without the numbers in their columns 73 to 80, where those of its first lines rise."""
+    first = [line for line in data[:810].split(b"\n")[:10] if line.strip()]
+    first = first[:-1] if len(data) > 810 else first
+    if len(first) < 3 or not all(len(line) == 80 and _CARD.fullmatch(line[72:]) for line in first):
+        return data
+    numbers = [int(line[72:].lstrip(_LETTERS)) for line in first]
+    if numbers != sorted(set(numbers)):
+        return data
+    return b"\n".join(line[:72] if _CARD.fullmatch(line[72:80]) and len(line) == 80 else line for line in data.split(b"\n"))
 
 
 def without_carriage_returns(data: bytes) -> bytes:

@@ -127,16 +127,26 @@ _ONE_LETTER = pattern(r"[-+.\d]*[^-+.\d][-+.\d]*")
 _TWO_NUMBERS = pattern(r"[\d.]\s+[-+.\d]")
 _STARTS_NUMBER = frozenset("+-.0123456789")
 _LEADING_ZEROS = pattern(r"[+-]?(?:0\d+|\.0*)")
+_ONLY_ZEROS, _POINT_FIRST = pattern(r"[+-]?\.0+"), re.compile(rb"[/,\s][+-]?\.\d*[1-9]\d*[,\s]")
+_CUT_OFF = "a number is cut off at its point"
 
 
-def check_forms(program: StatementList, log: DiagnosticLog, allowed: Iterable[str], dialect: Dialect) -> None:
-    """An error for each different statement that departs from the form of its word, where its line has none yet."""
+def check_forms(program: StatementList, log: DiagnosticLog, allowed: Iterable[str], dialect: Dialect, raw: bytes) -> None:
+    """An error for each different statement that departs from the form of its word, where its line has none yet.
+
+    Args:
+        program: the statements of the file
+        log: where errors go
+        allowed: words whose form is not looked at
+        dialect: which system wrote the file
+        raw: the file, for how it writes its numbers
+    """
     allow, refused = frozenset(allowed), log.lines_with_errors()
     for statement, line in program.first.items():
         if statement.major in allow or line in refused:
             continue
         fault = fault_of(statement, allow) or ("" if dialect.six_sizes else _six_sizes(statement))
-        if fault:
+        if fault and not (fault == _CUT_OFF and _writes_points_first(statement, raw)):
             name = statement.major.removeprefix(DATA_COMMENT)
             between = "/" if statement.body and statement.slash else " " if statement.body else ""
             comma = name == "FEDRAT" and len(statement.numbers) == 2 and all(n == int(n) for n in statement.numbers)
@@ -285,8 +295,14 @@ def _numbers_fault(s: Statement, form: RecordForm) -> str:
     if s.major == "COOLNT" and count and isinstance(s.words[0], float) and len(s.words) > 1:
         return "a number before its word"
     if form.lengths and any(_LEADING_ZEROS.fullmatch(part.strip()) for part in re.split(r"[,\s]+", s.body)):
-        return "a number is cut off at its point"
+        return _CUT_OFF
     return ""
+
+
+def _writes_points_first(s: Statement, raw: bytes) -> bool:
+    """True where `.0000` is how the file writes 0, as it writes .5 for 0.5."""
+    cut = [part for part in re.split(r"[,\s]+", s.body) if _LEADING_ZEROS.fullmatch(part)]
+    return all(_ONLY_ZEROS.fullmatch(part) for part in cut) and _POINT_FIRST.search(raw) is not None
 
 
 def _six_sizes(s: Statement) -> str:

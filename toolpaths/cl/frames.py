@@ -274,13 +274,12 @@ def turn_back(b: ToolpathBuilder) -> None:
     missing, which is an error, or made up for (`tlaxis_upright`)."""
     if b.row == b.turned_at or np.abs(b.turned - np.eye(3)).max() <= _SAME_FRAME:
         return
-    if b.dialect.tlaxis_upright:
-        b.table, b.turned = [0.0, 0.0, 0.0], np.eye(3)
-        refresh(b)
-    else:
+    if not b.dialect.tlaxis_upright:
         b.log.error("cl.rotabl-open", "the frame of the points is still turned where the next operation begins: the ROTABL "
                     "that turn it back are missing", b.line, "--axis-from tlaxis begins each TLAXIS with the frame upright; "
                     "else write the file again in the CAM system")
+    b.table, b.turned = [0.0, 0.0, 0.0], np.eye(3)  # else what follows would be at fault too
+    refresh(b)
 
 
 def use_world_axis(b: ToolpathBuilder) -> None:

@@ -119,7 +119,7 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
     toolpath = assemble(b)
     _check_rapids(b, toolpath)
     if apt or shop is not None:
-        check_forms(program, log, b.allow_unknown, found)
+        check_forms(program, log, b.allow_unknown, found, raw)
     records = counted(b, frozenset(HANDLERS))
     if _no_apt_text(b, records):
         return _refused(file, "no line of it is a record of APT text, and it is no form of a CAM system that is read", APT)

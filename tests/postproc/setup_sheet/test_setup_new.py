@@ -306,7 +306,9 @@ def test_where_no_place_fits_nothing_says_move_the_part(tmp_path: Path) -> None:
     file.write_text("UNITS/MM\nLOADTL/1\nSPINDL/RPM,3000,CLW\nFEDRAT/500,MMPM\nRAPID\nGOTO/0,0,50\nGOTO/0,0,0\nGOTO/10,0,0\n"
                     "GOTO/2000,0,0\nGOTO/2010,0,0\nGOTO/2020,0,0\nRAPID\nGOTO/2020,0,50\nFINI\n")
     got = run("convert", file, "-m", "mill-3axis", "-c", "linuxcnc", "-o", tmp_path / "p.nc", code=1)
-    assert "no place of the part was found" in got.stderr and "move the part" not in got.stderr
+    assert "in each of the 4 attitudes looked at it is outside travel" in got.stderr and "move the part" not in got.stderr
+    travel = float(np.max(machine("mill-3axis").limits.upper - machine("mill-3axis").limits.lower))
+    assert f"; at best axis X lacks {(2020.0 - travel) / 2.0:.3f} mm" in got.stderr, "by hand: at both ends alike"
 
 
 def test_what_no_place_puts_right_is_explained(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from postproc.report.summary import as_text
 from postproc.verification.second_witness import machine_tables
 from postproc.witness.clamps import limits_of
 from postproc.witness.clfile import commanded
-from postproc.witness.commanded import HOLE, LINE
+from postproc.witness.commanded import HOLE, LINE, RAPID
 from postproc.witness.machine import Chain, Rods, kinematics_of, merged
 from toolpaths.diagnostics import has_errors
 from toolpaths.toolpath import Kind, Role
@@ -132,3 +132,15 @@ def test_holes_that_are_not_read_refuse_no_program_that_comes_back_to_where_it_w
     result = postproc.convert(path, "mill-3axis", diagnostics=found)
     assert result.ok, [str(d) for d in result.diagnostics]
     assert result.witness is not None and [what for what in result.witness.not_compared if "CYCLE" in what.why]
+
+
+def test_numbers_of_cards_are_no_parameters() -> None:
+    """They were the last word of each record, and RAPID no word that it knows: a true program was refused."""
+    lines = ["PARTNO A", "UNITS/MM", "RAPID", "GOTO/1,2,3", "FEDRAT/MMPM,100", "GOTO/4,5,6", "FINI"]
+    for deck in ([f"{line:<72}{10 * k:08d}" for k, line in enumerate(lines, 1)],
+                 [f"{line:<72}ABC{k:05d}" for k, line in enumerate(lines, 1)]):
+        seen = commanded("\n".join(deck).encode())
+        assert seen.tip[:, :3].tolist() == [[1, 2, 3], [4, 5, 6]] and seen.kind.tolist() == [RAPID, LINE]
+        assert not seen.unread and seen.feed[1] == 100.0
+    plain = [f"GOTO/{k},0,0,{' ' * 60}{1000 + k}" for k in range(6)]
+    assert len(commanded("\n".join(plain).encode()).tip) == 6

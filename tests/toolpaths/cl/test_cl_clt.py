@@ -72,6 +72,11 @@ def test_a_frame_that_is_not_turned_back_is_refused_and_read_by_tlaxis() -> None
     assert text.count("ROTABL") == 6
     refused = [d for d in read_bytes(text).diagnostics if d.severity is Severity.ERROR]
     assert [d.code for d in refused] == ["cl.rotabl-open"] and "--axis-from tlaxis" in refused[0].hint
+    upright = unclosed(feature("0.6,0.0,0.8", (0.0, math.asin(0.6), 0.0), "GOTO/ 7.0,2.0,3.0 \n")
+                       + feature("0.0,0.0,1.0", (0.0, 0.0, 0.0), "GOTO/ 1.0,2.0,3.0 \n"))
+    errors = [d.code for d in read_bytes(HEAD + upright + "FINI \n").diagnostics if d.severity is Severity.ERROR]
+    assert errors == ["cl.rotabl-open"], (
+        "operations behind it are not at fault")
     asked = read_bytes(text, dialect="tlaxis")
     assert not [d for d in asked.diagnostics if d.severity is not Severity.INFO]
     assert asked.toolpath.tip.tolist() == right.tip.tolist() and asked.toolpath.axis == pytest.approx(right.axis, abs=1e-12)

@@ -142,3 +142,11 @@ def test_the_nearest_word_is_the_first_that_is_one_edit_away() -> None:
     words = ["".join(rng.choices("ABC", k=rng.randint(0, 5))) for _ in range(60)]
     for word in ("".join(rng.choices("ABCD", k=rng.randint(0, 6))) for _ in range(300)):
         assert nearest(word, words) == next((known for known in words if one_edit(word, known)), "")
+
+
+def test_zeros_without_a_digit_before_the_point_are_cut_off_unless_the_file_writes_all_numbers_so() -> None:
+    """BobCAD's inch files write .5000 and .0000; where others write 0.5000, .0000 is what is left of 12.0000."""
+    cutter = "generic CUTTER/1.0000,.0000"
+    assert errors(read(cutter)) == ["cl.form"]
+    assert not errors(read(cutter, "GOTO/.5000,.0000,-.2500\n"))
+    assert errors(read("generic CUTTER/1.0000,07", "GOTO/.5000,.0000,-.2500\n")) == ["cl.form"]
