@@ -65,7 +65,7 @@ def assemble(b: ToolpathBuilder) -> Toolpath:
     cycle, cycles = _used_cycles(b, cycle)
     feed, mode = _feeds(b, rows, kind)
     cycles = _fed_cycles(b, cycle, cycles)
-    operation, operations, frames = _operations(b, n)
+    operation, operations, frames = _operations(b, rows)
     tool, tools = _tools(b, n)
     events = b.events if b.declared else loaded(b.events, tools, tool, rows.line)
     pass_ = passes((kind == Kind.RAPID) & (role != Role.HOLE), operation, tool)
@@ -353,12 +353,24 @@ def _feeds(b: ToolpathBuilder, rows: PointRows, kind: Array) -> tuple[Floats, Ar
     return feed, mode
 
 
-def _operations(b: ToolpathBuilder, n: int) -> tuple[Array, tuple[Operation, ...], tuple[Frame, ...]]:
+def _turning(b: ToolpathBuilder, rows: PointRows, column: Ints) -> set[int]:
+    """Operations that are turning: by a word for it, or by a surface speed where no tool axis leans."""
+    n = len(rows)
+    leans = set(np.unique(column[np.abs(rows.axis[:, :2]).max(axis=1) > AXIS_AGREES]).tolist())
+
+    def of(marks: set[tuple[int, int]]) -> set[int]:
+        return {int(column[row]) if row < n else op for op, row in marks}
+
+    return of(b.turning) | (of(b.surface_speed) - leans)
+
+
+def _operations(b: ToolpathBuilder, rows: PointRows) -> tuple[Array, tuple[Operation, ...], tuple[Frame, ...]]:
     """(operation per row, operations with their frames, frames)."""
+    n = len(rows)
     column = spread(b.operation, n, np.int32)
     if b.declared is not None and b.declared.operations:
         return np.maximum(column, 0), tuple(b.declared.operations), tuple(b.declared.frames) or (Frame("absolute"),)
-    turning = {int(column[row]) if row < n else op for op, row in b.turning}
+    turning = _turning(b, rows, column)
     operations = [replace(op, turning=i in turning) for i, op in enumerate(b.operations)]
     if not operations or (n and column[0] < 0):
         operations.insert(0, Operation(turning=-1 in turning))

@@ -140,6 +140,8 @@ class ToolpathBuilder:
         """by cycle, where the file states its planes as heights"""
         self.turning: set[tuple[int, int]] = set()
         """(operation, row) where words of turning stood"""
+        self.surface_speed: set[tuple[int, int]] = set()
+        """(operation, row) where a surface speed stood: a lathe has one mostly, a mill may."""
         self.declared: Declared | None = None
         self.zsurf: float | None = None
         self.subprograms: Subprograms | None = None
@@ -248,9 +250,14 @@ class ToolpathBuilder:
         """The operation of the next row is turning, whatever still begins before that row."""
         self.turning.add((self.operation.now, self.row))
 
+    def has_surface_speed(self) -> None:
+        """The operation of the next row is turning, unless its tool axis leans."""
+        self.surface_speed.add((self.operation.now, self.row))
+
     def mills(self) -> None:
         """The operation of the next row is none of turning, whatever was said before that row."""
         self.turning.discard((self.operation.now, self.row))
+        self.surface_speed.discard((self.operation.now, self.row))
 
     def last_point(self) -> Triple | None:
         """Coordinates of the row before, as written; None where there is none."""

@@ -146,9 +146,9 @@ def dwell(b: ToolpathBuilder, s: Statement) -> None:
 
 
 def spindl(b: ToolpathBuilder, s: Statement) -> None:
-    """An event; a surface speed belongs to turning, but where TLDATA describes a mill or a drill."""
+    """An event; a surface speed belongs to turning, but where TLDATA describes a mill or a drill, or the tool axis leans."""
     if s.has("SFM", "SMM") and not is_rotating(b):
-        b.turns()
+        b.has_surface_speed()
     plain_event(b, s)
 
 

@@ -190,6 +190,11 @@ def test_a_mill_at_a_surface_speed_is_no_turning() -> None:
     assert [op.turning for op in p.operations] == [False]
 
 
+def test_a_leaning_tool_axis_at_a_surface_speed_is_no_turning() -> None:
+    p = read("MULTAX/ON\nSPINDL/200.0,SMM,CLW\nGOTO/1,2,3,0,0.6,0.8\n")
+    assert [op.turning for op in p.operations] == [False]
+
+
 @pytest.mark.parametrize("text", ["SPINDL/ 500.0,SMM,CCLW\nTRNTYP/WORLD,0,0,0\nGOTO/1,2,3\n",
                                   "$$*CATIA0\nSPINDL/ 500.0,SMM,CCLW\n$$ OPERATION NAME : Face.1\nGOTO/1,2,3\n"])
 def test_turning_reported_before_its_operation_begins_is_of_that_operation(text: str) -> None:
