@@ -211,7 +211,7 @@ def pose_words(pose: Floats, legs: LegGeometry) -> str:
     words = f"x {x:.4g}, y {y:.4g}, z {z:.4g} mm"
     if legs.turns:
         words += f", tilt {tilt / DEG:.4g} degrees"
-    return words + (f" towards {heading / DEG:.4g}" if legs.tilts_everywhere else "")
+    return words + (f" towards {round(heading / DEG, 2) % 360.0:.4g}" if legs.tilts_everywhere else "")
 
 
 def _figures(of: Certified) -> dict[str, Any]:

@@ -198,11 +198,21 @@ def _add_links(out: PathBuilder, road: _Road, runs: SolvedRuns, stand: _Stand,
         leaving = road.modes.at(before.frame.control.place).base
         _add_link(out, moves, first, link, _Legs(before.frame, leaving if by_home else travel, travel, run.frame, before.kin,
                                                  run.kin, before.pose, entry, down, _risen(modes, before.frame, link)))
-        if not link.clear:
-            found.append(faults.no_path(modes.control.machine, moves, first, road.file))
+        inside = _home_inside(modes, before.kin, run.kin, space) if by_home else None
+        if not link.clear or (inside is not None and not has_retract_axis(travel.control)):
+            found.append(faults.no_path(modes.control.machine, moves, first, road.file, inside))
         if progress:
             progress("blocks", run.last, len(moves))
     return stand, longer, found
+
+
+def _home_inside(modes: OutputModes, before: Kinematics, after: Kinematics, space: SafeSpace) -> Floats | None:
+    """(3,) tip of the tool at home, in the table frame, where that is inside the extent of what is cut; else None."""
+    for kin in (before, after):
+        tip, axis = kin.forward(modes.control.machine.home[None])
+        if not space.in_plane and space.room(tip, axis)[0] < 0.0:
+            return np.asarray(tip[0])
+    return None
 
 
 def _travel(modes: OutputModes, before: WordFrame, after: WordFrame, by_home: bool) -> WordFrame:

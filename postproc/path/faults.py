@@ -109,13 +109,19 @@ def _elsewhere(kin: Kinematics, tip: Floats, q: Floats) -> Bools:
     return np.asarray(~(np.linalg.norm(there - tip, axis=1) <= _ELSEWHERE))
 
 
-def no_path(machine: Machine, moves: Moves, row: int, file: str) -> Diagnostic:
-    """The error where no linking move leads to row `row` of the moves."""
+def no_path(machine: Machine, moves: Moves, row: int, file: str, home: Floats | None = None) -> Diagnostic:
+    """The error where no linking move leads to row `row` of the moves; `home` (3,): tip at home, if that is in the part."""
     if machine.kinematics.plane is not None:
         return error("link.in_plane", f"{machine.name} moves the tool in one plane alone, so no linking move leaves what is "
                      "cut", file=file, lines=[int(moves.line[row])], hint="write in_plane = true under [clearance] of "
                      "the set-up where the tool is lifted or switched off by other means: linking moves then go straight in "
                      "that plane; or give the machine file a slide that leaves it ([kinematics.carriers.Z])")
+    if home is not None:
+        x, y, z = np.round(home, 3) + 0.0
+        return error("link.home", f"home of {machine.name} is inside what is cut: there the tip of the tool is at ({x:.3f}, "
+                     f"{y:.3f}, {z:.3f}) mm of the table frame, and tool changes and both ends of the program go by home",
+                     file=file, lines=[int(moves.line[row])],
+                     hint="move the part away from home (part.origin), or state another home in the machine file")
     return error("link.blocked", "no linking move stays above the safe planes", file=file, lines=[int(moves.line[row])],
                  hint="move the part in the set-up (part.origin), or lower clearance.margin")
 

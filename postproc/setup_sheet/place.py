@@ -29,8 +29,8 @@ from toolpaths.diagnostics import Diagnostic, Severity, info
 from toolpaths.toolpath import Kind, Toolpath
 from toolpaths.units import DEG
 
-PLACES = frozenset({*BEYOND, "link.blocked", "path.jump", "reach.axis", "singular.distance", "verify.link", "verify.travel",
-                    "collision.clear"})
+PLACES = frozenset({*BEYOND, "link.blocked", "link.home", "path.jump", "reach.axis", "singular.distance", "verify.link",
+                    "verify.travel", "collision.clear"})
 """codes of errors that another place or attitude may put right"""
 _ATTITUDES, _PROOFS = 12, 6
 """attitudes that are looked at; conversions before giving up"""

@@ -27,7 +27,7 @@ SCHEMA_VERSION = 1
 """of the JSON objects of all commands; it rises where a key changes its meaning or goes"""
 ALIKE = 4
 """diagnostics of one code and one remedy up to which each is shown"""
-PLACED = frozenset({"travel.exceeded", "reach.axis", "reach.position", "link.blocked", "path.jump"})
+PLACED = frozenset({"travel.exceeded", "reach.axis", "reach.position", "link.blocked", "link.home", "path.jump"})
 """codes whose remedy is that of `place.found`, where that is said"""
 _MOVE, _LOWER = "move the part in the set-up (part.origin)", "lower clearance.margin"
 _SHORTER = "use a shorter tool (gauge_length)"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import machines
+from machines.analysis.certify import pose_words
 from machines.analysis.report import _transmission
 from machines.analysis.transmission import Towards, condition_number, conditioning_factor, manipulability, speed_transmission
 from toolpaths.units import DEG
@@ -30,3 +31,9 @@ def test_the_measure_there_is_the_value(name: str, monkeypatch: pytest.MonkeyPat
         assert ("at_heading_deg" in row) == (name == "hexapod")
     assert found["conditioning_factor"]["worst"] <= found["conditioning_factor"]["best_on_grid"]
     assert "least_on_grid" not in found["conditioning_factor"]
+
+
+def test_a_whole_turn_is_written_as_none() -> None:
+    legs = machines.load("hexapod").kinematics.leg_geometry
+    assert legs is not None
+    assert pose_words(np.array([1.0, 2.0, 3.0, 0.2, 2.0 * np.pi - 1e-7]), legs).endswith("degrees towards 0")

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import postproc
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile
 from postproc.verification.read_back import read_back
@@ -20,11 +22,13 @@ from tests.postproc.kit import (
     good,
     goto,
     sample,
+    setup_of,
     tilted,
     tool_poses,
     tool_setup,
     toolpath,
 )
+from toolpaths.diagnostics import Severity
 
 MACHINES = ["mikron-ucp710", "trunnion-bc", "head-table", "fork-head-ab"]
 SLACK = 0.02
@@ -177,3 +181,13 @@ def test_tool_is_changed_at_home_only() -> None:
         assert len(changes) == len([n for n in result.text.splitlines() if n.endswith("M6")])
         for before, _ in changes:
             assert before.end[z] == result.machine.home[z]
+
+
+def test_a_home_inside_the_part_is_named(tmp_path: Path) -> None:
+    """Of a machine without an axis that draws the tool back, whose links would go to it through what is cut."""
+    slides = "".join(f"[axes.{letter}]\nhome = 1112.43\n" for letter in "XYZ")
+    (tmp_path / "low.toml").write_text(f'base = "delta-parallel-z"\n{slides}')
+    path = toolpath("LOADTL/1", "SPINDL/RPM,800,CLW", "RAPID", "GOTO/-60,0,65", "FEDRAT/MMPM,900", "GOTO/60,0,-10")
+    setup = setup_of("[part]\norigin = [0, 0, -100]\n[tools.1]\ngauge_length = 80\n[clearance]\nmargin = 10\n")
+    result = postproc.convert(path, tmp_path / "low.toml", setup=setup)
+    assert [d.code for d in result.diagnostics if d.severity is Severity.ERROR] == ["link.home"]
