@@ -145,6 +145,11 @@ _INDEX = [
              r'write (index = "plane") under \[clearance\]', (sheet('index = "home"', r"\1"),),
              first=(f"convert part.apt {_ON} -o p.nc --output-mode axes",),
              harm=(Edit("s.toml", '"plane"', '"home"'),)),
+    HintCase("verify.safe_plane", f"verify p.nc part.apt {_ON}",
+             {"part.apt": START + TURNED + "FINI\n", "s.toml": LENGTH + "[clearance]\ndistance = 60\n"},
+             r"write (distance = [\d.]+) under \[clearance\]", (sheet("distance = 80", r"\1"),),
+             first=(f"convert part.apt {_ON} -o p.nc --output-mode axes",),
+             harm=(Edit("s.toml", "= 60", "= 80"),)),
 ]
 SAMPLE_KIND = SAMPLE.read_text("utf-8")
 LONG = "tip[:, 2] + self.tool_length", "tip[:, 2] + 0.0"
