@@ -111,6 +111,8 @@ def _lost(code: Canonical, reader: Reader, file: str) -> list[Diagnostic]:
     lost = blocks[by]
     first = work[np.searchsorted(work, lost)]
     bad = distinct(first[first < np.minimum(stated[np.searchsorted(stated, lost)], end)])
-    return [error("gcode.unstated", "nothing states the work offset behind " + " or ".join(sorted(reader.lost_by)) + ", with "
-                  "which the control may lose it, before this block", file=file, lines=code.line[bad][:6].tolist(),
-                  count=len(bad), hint="state the work offset (G54 ...) again behind it")] if len(bad) else []
+    if not len(bad):
+        return []
+    return [error("gcode.unstated", "nothing states the work offset behind " + " or ".join(sorted(reader.lost_by))
+                  + ", with which the control may lose it, before this block", file=file,
+                  lines=code.line[bad][:6].tolist(), count=len(bad), hint="state the work offset (G54 ...) again behind it")]
