@@ -165,7 +165,7 @@ class ToolpathBuilder:
         """turned machine to part, by ROTATE alone (Creo)"""
         self.table_here: Floats = np.eye(3)
         """the same where the last system was stated"""
-        self.turn_doubt = ""
+        self.unknown_turn = ""
         """what is not known of the angle of ROTATE (Creo), until a system is stated"""
         self.turns_at: list[int] = []
         """rows before which ROTATE stands"""

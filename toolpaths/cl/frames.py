@@ -23,7 +23,7 @@ def set_system(b: ToolpathBuilder, name: str, matrix: Floats, origin: Floats) ->
     b.here = (matrix, origin)
     b.turned = np.eye(3)
     b.table_here = b.table_turn
-    b.turn_doubt = ""
+    b.unknown_turn = ""
     if not indexing.in_force(b):
         _name_system(b, name, matrix, origin)
     refresh(b)
@@ -214,7 +214,7 @@ def rotate(b: ToolpathBuilder, s: Statement) -> None:
     """ROTATE, ROTABL, ROTHED: an event. In Creo and `.clt`, points after it are in the turned frame, unless a
     system (CSYS) follows, which then says where they are. In Creo the table turns by the angle, so the frame
     turns by less that angle in the part; in `.clt` the frame itself does, as the TLAXIS of the same operation shows.
-    INCR adds the angle, ABS and ATANGL (without it) state it; Creo's other readings are a doubt, which a system ends."""
+    INCR adds the angle, ABS and ATANGL (without it) state it; Creo's other readings are unknown until a system follows."""
     b.event(s.major, tuple(w for w in s.words if w != ""))
     axis = next((_AXES[w] for w in s.words if isinstance(w, str) and w in _AXES), None)
     angle = s.after("ATANGL", "INCR")
@@ -230,12 +230,12 @@ def rotate(b: ToolpathBuilder, s: Statement) -> None:
         return
     turn = _radians(angle) if b.dialect.rotabl_radians and s.major != "ROTATE" else angle * DEG
     turn, added = -turn if s.has("CLW") else turn, s.has("INCR") or not s.has("ATANGL", "ABS")
-    if b.dialect.table_frames and (doubt := _turn_doubt(s, b.table[axis], turn, added)):
-        b.turn_doubt = doubt
+    if b.dialect.table_frames and (unknown := _unknown_turn(s, b.table[axis], turn, added)):
+        b.unknown_turn = unknown
     _turn(b, axis, turn, added)
 
 
-def _turn_doubt(s: Statement, old: float, turn: float, added: bool) -> str:
+def _unknown_turn(s: Statement, old: float, turn: float, added: bool) -> str:
     """What is not known of an angle that adds to the table's or states it, or of the way round CLW to a stated one; ""
     where all readings turn the table alike."""
     other = turn if added else -turn if s.has("CLW") else turn

@@ -56,7 +56,7 @@ def turn_table(b: ToolpathBuilder, axis: int, step: float) -> None:
     old, b.table_turn = b.table_turn, b.table_turn @ rotation(np.eye(3)[axis], np.array([-step]))[0]
     z = b.turned @ b.here[0][:, 2]
     if _apart(z, old[:, 2]) > SAME_AXIS >= _apart(z, b.table_turn[:, 2]):
-        b.table_here, b.turn_doubt = b.table_turn, ""
+        b.table_here, b.unknown_turn = b.table_turn, ""
     b.turned = b.table_turn @ b.table_here.T
     b.turns_at.append(b.row)
 
@@ -85,7 +85,7 @@ def _axis_fault(b: ToolpathBuilder, matrix: Floats) -> str:
     if any(b.table) and _apart(matrix[:, 2], b.table_turn[:, 2]) > SAME_AXIS:
         return (f"by ROTATE the tool axis is ({_text(b.table_turn[:, 2])}) in the part, by the CSYS remark it is "
                 f"({_text(matrix[:, 2])})")
-    return b.turn_doubt
+    return b.unknown_turn
 
 
 def cancels(b: ToolpathBuilder, shift: Floats) -> bool:

@@ -38,7 +38,7 @@ def check_stated(code: Canonical, reader: Reader, file: str) -> list[Diagnostic]
                                 lines=code.line[bad][:6].tolist(), count=len(bad),
                                 hint=f"state {words} at the start of the program; where the control itself puts it in force "
                                 "before every program, name the code in [start] codes of the controller file"))
-    return result + _undone(code, reader, file)
+    return result + _undone(code, reader, file) + _lost(code, reader, file)
 
 
 def _needs(code: Canonical, reader: Reader) -> Iterator[Need]:
@@ -96,3 +96,23 @@ def _undone(code: Canonical, reader: Reader, file: str) -> list[Diagnostic]:
                                 "the program before", file=file, lines=[int(code.line[moves[0]])],
                                 hint=f"state {leaving[0]} at the start of the program"))
     return result
+
+
+def _lost(code: Canonical, reader: Reader, file: str) -> list[Diagnostic]:
+    """Moves in a work offset behind a code with which the control may have lost it, before it is stated again."""
+    blocks, index = code.words.pick(LAW)
+    by = [code.laws[int(k)].code in reader.lost_by for k in index]
+    if not any(by):
+        return []
+    moves, machine = _moves(code.words, reader.axes), codes(code.words, "G", (53,))[0]
+    end = code.words.lines + 1
+    work = np.append(moves[~_among_blocks(code.words, machine)[moves]], end)
+    stated = np.append(np.sort(code.words.pick(OFFSET)[0]), end)
+    lost = blocks[by]
+    first = work[np.searchsorted(work, lost)]
+    bad = distinct(first[first < np.minimum(stated[np.searchsorted(stated, lost)], end)])
+    if not len(bad):
+        return []
+    return [error("gcode.unstated", "nothing states the work offset behind " + " or ".join(sorted(reader.lost_by))
+                  + ", with which the control may lose it, before this block", file=file,
+                  lines=code.line[bad][:6].tolist(), count=len(bad), hint="state the work offset (G54 ...) again behind it")]

@@ -64,6 +64,7 @@ class Reader(ABC):
         units_stay: that is a setting of the control, which no program changes
         stating: by group, the words that state it; a block that relies on one that nothing states is an error in `verify`
         leaving: by law, the codes that switch it off; modes_named: what the control calls it
+        lost_by: codes of laws with which the work offset may be lost: it is stated again before the next move in it
         stop: what M0 and M1 switch off, by the controller file or by that of the machine (`[control] stop`)
         changes: what a tool change switches off
         clamps: codes of the clamps that programs work, by axis
@@ -92,6 +93,7 @@ class Reader(ABC):
         "compensation": "G40", "length": "G49, or G43 with H", "level": "G98 or G99",
         "offset": "the work offset (G54 ...)"}
     leaving: ClassVar[dict[InterpolationMode, tuple[str, ...]]] = {}
+    lost_by: ClassVar[frozenset[str]] = frozenset()
     modes_named: ClassVar[dict[InterpolationMode, str]] = {"tcp": "the tool-centre-point mode",
                                                                "tilted": "the tilted plane"}
 

@@ -75,6 +75,8 @@ class SiemensReader(Reader):
     letters = f"GMFSTDNIJKRLP?~>{ROUNDED}{ROUNDED_RAPID}"
     stating = {k: v for k, v in Reader.stating.items() if k != "level"} | {"length": "D, or a tool"}
     leaving: ClassVar[dict[InterpolationMode, tuple[str, ...]]] = {"tcp": ("TRAFOOF",), "tilted": ("CYCLE800",)}
+    lost_by: ClassVar[frozenset[str]] = frozenset({"TRAORI", "TRAFOOF"})
+    """S2 6.: frames may be lost"""
     neutral: ClassVar[frozenset[str]] = PASSIVE
     statements = KNOWN
     units_codes = "G70, G71, G700 or G710"

@@ -175,3 +175,14 @@ def test_compensation_that_is_left_on_for_a_rapid(controller: str) -> None:
     at = next(m for m in re.finditer(code, result.text) if m.start() > on)
     text = result.text[:at.start()] + ("\n" if controller == FANUC else "") + result.text[at.end():]
     assert "verify.state" in caught(result, text)
+
+
+def test_a_work_offset_that_traori_may_have_lost_is_stated_again() -> None:
+    """The reader kept it: a program without it was proved, though the control may drop its frames."""
+    first, then = "0,0.17513,0.9845447", "0.05,0.3420201433257,0.9383616"
+    result = good(convert(toolpath("LOADTL/1", "SPINDL/900,RPM,CLW", "RAPID", f"GOTO/5,0,50,{first}", "FEDRAT/500,MMPM",
+                                   f"GOTO/5,0,5,{first}", f"GOTO/9,0,5,{then}", "RAPID", f"GOTO/9,20,50,{then}"),
+                          "mikron-ucp710", SIEMENS, output="tcp"))
+    text, count = re.subn(r"(TRAORI\n)(?:N\d+ )?G54\n", r"\1", result.text)
+    assert count == 1 and [d.code for d in errors(result, text)] == ["gcode.unstated"]
+    assert not errors(result, re.sub(r"(TRAORI)\n(?:N\d+ )?G54\n", r"\1 G54\n", result.text))
