@@ -48,7 +48,7 @@ def _link(found: re.Match[str], source: Path, page: Path, copied: dict[Path, Pat
     if place is None:
         return found[0]
     there = copied.get(place, place)
-    if DOCS not in there.parents or not there.is_file():
+    if DOCS not in there.parents or there == place and not (place.is_file() or "generated" in place.parts):
         return found["words"]
     heading = found["target"].partition("#")[2]
     return f"[{found['words']}]({os.path.relpath(there, page.parent)}{'#' + heading if heading else ''})".replace(os.sep, "/")

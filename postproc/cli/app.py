@@ -27,6 +27,8 @@ from postproc.cli.place import EXAMPLES as PLACES
 from postproc.cli.place import place
 from postproc.cli.report import EXAMPLE as REPORTS
 from postproc.cli.report import check_page, pages, report_command
+from postproc.cli.schema import EXAMPLES as SCHEMAS
+from postproc.cli.schema import schema
 from postproc.cli.shared.console import (
     Json,
     controller_of,
@@ -90,6 +92,7 @@ app.command("orient", epilog=EXAMPLES)(orient_command)
 app.command(epilog=PLACES)(place)
 app.command("report", epilog=REPORTS)(report_command)
 app.command(epilog=BATCHES)(batch)
+app.command(epilog=SCHEMAS)(schema)
 app.command(epilog=DIFFERENCES)(compare)
 
 Setup = Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, safe distances")]

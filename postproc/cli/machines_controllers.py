@@ -143,9 +143,9 @@ def machine_check(file: Annotated[str, typer.Argument(help="TOML file or name")]
 @machine_app.command("schema")
 def machine_schema() -> None:
     """Print the JSON schema of a machine file."""
-    import machines
+    from postproc.cli.shared.schemas import file_schema
 
-    print_json(machines.schema())
+    print_json(file_schema("machine-file"))
 
 
 @setup_app.command("check", epilog="Example: postproc setup check part.setup.toml")
@@ -174,10 +174,9 @@ def setup_check(file: Annotated[str, typer.Argument(help="TOML file")], json: Js
 @setup_app.command("schema")
 def setup_schema() -> None:
     """Print the JSON schema of a set-up file."""
-    from machines.user_model import schema
-    from postproc.setup.model import SetupFile
+    from postproc.cli.shared.schemas import file_schema
 
-    print_json(schema("setup", SetupFile))
+    print_json(file_schema("setup-file"))
 
 
 @controller_app.command("list")
@@ -204,7 +203,6 @@ def controller_show(name: Annotated[str, typer.Argument(help="name or TOML file"
 @controller_app.command("schema")
 def controller_schema() -> None:
     """Print the JSON schema of a controller file."""
-    from machines.user_model import schema
-    from postproc.controllers.model import ControllerFile
+    from postproc.cli.shared.schemas import file_schema
 
-    print_json(schema("controller", ControllerFile))
+    print_json(file_schema("controller-file"))

@@ -26,4 +26,4 @@ def schema(what: Annotated[list[str] | None, typer.Argument(metavar="NAME", help
     else:
         from machines.user_file import nearest
 
-        raise typer.BadParameter(f"no file and no command {name!r}{nearest(name, [*FILES, *RESULTS])}", param_hint="NAME")
+        raise typer.BadParameter(f"no file and no command {name!r}; {nearest(name, [*FILES, *RESULTS])}", param_hint="NAME")
