@@ -43,8 +43,8 @@ def write_schemas(folder: Path) -> None:
 
 def results_page() -> str:
     """Keys that stay of what each command writes, and where its schema is."""
-    parts = ["# JSON of each command: keys that stay", "", "`postproc schema COMMAND` prints the schema. In every object stand "
-             "`schema_version`, `ok` and `diagnostics` too; more keys may come.", ""]
+    parts = ["# JSON of each command: keys that stay", "", "`postproc schema COMMAND` prints the schema. In every object "
+             "stand `schema_version`, `ok` and `diagnostics` too; more keys may come.", ""]
     for command, keys in RESULTS.items():
         parts += [f"## {command}", "", f'<a href="../../schemas/{command.replace(" ", "-")}.json">Its schema</a>', "",
                   *(["| key | type |", "|---|---|", *(f"| `{key}` | {kind} |" for key, kind in keys.items())] if keys else
