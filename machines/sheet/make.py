@@ -8,7 +8,8 @@ from dataclasses import field, replace
 from pathlib import Path
 
 from machines.figures import ASSUMED, SOURCE
-from machines.loader import as_warnings, assemble, check
+from machines.key_problem import KeyProblem
+from machines.loader import assemble, check
 from machines.machine import Machine
 from machines.plausible import implausible
 from machines.sheet.distances import against_distances, distances
@@ -170,7 +171,7 @@ def _made(file: UserFile, sheet: DataSheet, name: str) -> NewMachine:
         return NewMachine(None, "", faults)
     machine = assemble(whole, model)
     odd = [file.problem(p.code, p.path, p.message, p.hint) for p in against_distances(machine, sheet)]
-    found = [*faults, *as_warnings(whole, machine), *(replace(one, severity=Severity.WARNING) for one in odd)]
+    found = [*faults, *_odd(whole, machine, sheet), *(replace(one, severity=Severity.WARNING) for one in odd)]
     text = machine_text(making.figures, Path(file.file).name)
     return NewMachine(machine, text, found, () if sheet.touched else sheet.rotary)
 
@@ -196,8 +197,25 @@ def _odd_with(making: _Making, sheet: DataSheet, slide: FileValue, fast: float) 
     model, faults = check(whole)
     if model is None or has_errors(faults):
         return [d for d in faults if d.code in ("file.range", "file.value")]
-    odd = implausible(assemble(whole, model))
-    return [replace(whole.problem(p.code, p.path, p.message, p.hint), severity=Severity.WARNING) for p in odd]
+    return _odd(whole, assemble(whole, model), sheet)
+
+
+def _odd(whole: UserFile, machine: Machine, sheet: DataSheet) -> list[Diagnostic]:
+    """Figures that no machine has: a warning each, at the line of the sheet."""
+    return [replace(whole.problem(p.code, p.path, p.message, _of_sheet(p, sheet)), severity=Severity.WARNING)
+            for p in implausible(machine)]
+
+
+def _of_sheet(problem: KeyProblem, sheet: DataSheet) -> str:
+    """What to do about it in the sheet, whose figures have units of their own."""
+    table, letter, key = (str(one) for one in problem.path[:3])
+    axis = sheet.axes.get(letter) if table == "axes" else None
+    if axis is None:
+        return problem.hint
+    word, given = {"travel": ("travel", str(axis.travel)), "velocity": ("rapid", axis.rapid)}.get(
+        key, ("acceleration", axis.acceleration))
+    return f"see to the unit of {letter} {word}, which the sheet has as {given}" if given else (
+        f"see to the unit of {letter} rapid, which the sheet has as {axis.rapid}, or state its acceleration")
 
 
 def _header(making: _Making, sheet: DataSheet) -> None:
@@ -304,7 +322,7 @@ def _points(making: _Making, sheet: DataSheet) -> dict[str, list[float]]:
     if not sheet.rotary:
         return {}
     if sheet.pivots is None:
-        making.fault(("table",), f"where {' and '.join(sheet.rotary)} lie is not stated",
+        making.fault(("table",), f"where {' and '.join(sheet.rotary)} lie{'s' * (len(sheet.rotary) == 1)} is not stated",
                      'add [pivots] form = "haas", "siemens", "heidenhain", "fanuc" or "machine", and its numbers')
         return {}
     read, unread = read_pivots(sheet.pivots.form, sheet.pivots.text) if sheet.pivots.text else ({}, [])

@@ -44,7 +44,7 @@ def read_pivots(form: PivotForm, text: str) -> tuple[dict[str, tuple[float, floa
     missing = [(first + k, f"{'XYZ'[k]} of {name}") for first, name in given.items() for k in range(3)
                if first + k not in known]
     if wrong or missing:
-        return {}, wrong or [f"{_word(form, number)} is missing, {what}" for number, what in missing]
+        return {}, wrong or ["; ".join(f"{_word(form, number)} is missing, {what}" for number, what in missing)]
     return {name: (known[first], known[first + 1], known[first + 2]) for first, name in given.items()}, []
 
 

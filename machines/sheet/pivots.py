@@ -24,8 +24,10 @@ _TWO_TABLES: dict[PivotForm, VectorNames] = {
 _TWO_HEADS: dict[PivotForm, VectorNames] = {
     "siemens": ("I3", "I2", "(I1)"), "heidenhain": ("Trans 1", "Trans 2"), "fanuc": ("19709", "19712")}
 _MIXED: dict[PivotForm, tuple[VectorNames, VectorNames]] = {
-    "siemens": (("I3", "(I4)"), ("I2", "(I1)")), "heidenhain": (("Trans 1",), ("Trans 2",)),
+    "siemens": (("I3", "(I4)"), ("I2", "(I1)")), "heidenhain": (("Trans 2",), ("Trans 1",)),
     "fanuc": (("19700",), ("19709",))}
+_FROM_TOOL = ("heidenhain",)
+"""forms whose vectors are one sequence from the tool to the part: that of the table begins at the axis of the head"""
 
 
 def names_of(form: PivotForm, table: tuple[str, ...], head: tuple[str, ...]) -> tuple[VectorNames, VectorNames]:
@@ -48,6 +50,11 @@ def names_of(form: PivotForm, table: tuple[str, ...], head: tuple[str, ...]) -> 
                                'write form = "machine" and a point of each line') from None
 
 
+def _spelt(name: str) -> str:
+    """A name without what people leave out or add: "Trans2", "MRZP Second"."""
+    return "".join(name.split()).upper()
+
+
 def points_of(form: PivotForm, table: tuple[str, ...], head: tuple[str, ...],
               given: Mapping[str, tuple[float, float, float]]) -> tuple[dict[str, Floats], list[str]]:
     """A point of each axis, mm, machine coordinates, and what is wrong with the numbers.
@@ -56,15 +63,19 @@ def points_of(form: PivotForm, table: tuple[str, ...], head: tuple[str, ...],
     """
     chains = names_of(form, table, head)
     wanted = [name.strip("()") for chain in chains for name in chain]
+    plain = {_spelt(name): name for name in wanted}
+    given = {plain.get(_spelt(name), name): vector for name, vector in given.items()}
     wrong = [f"{name} is not a name of {form}: it has {', '.join(wanted)}"
              for name, vector in given.items() if name not in wanted and (name not in _SWIVEL or any(vector))]
     missing = [name for chain in chains for name in chain if name not in given and "(" not in name and name != "MRZP second"]
     if missing:
-        return {}, [*wrong, f"{', '.join(missing)} missing: X, Y and Z in mm"]
+        lacks = f"{', '.join(missing)} missing: X, Y and Z in mm"
+        return {}, [f"{'; '.join(wrong)}; {lacks}" if wrong else lacks]
     points = dict[str, Floats]()
-    for chain, letters in zip(chains, (table, head[::-1]), strict=True):
+    at = np.zeros(3)
+    for chain, letters in zip(chains[::-1], (head[::-1], table), strict=True):
         vectors = {name.strip("()"): np.array(given.get(name.strip("()"), (0.0, 0.0, 0.0))) for name in chain}
-        at = np.zeros(3)
+        at = at if form in _FROM_TOOL else np.zeros(3)
         for letter, name in zip(letters, chain, strict=False):
             at = at if name not in given else vectors[name] if form in _PLACES else at + vectors[name]
             points[letter] = at

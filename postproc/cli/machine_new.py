@@ -105,8 +105,9 @@ def _text(made: NewMachine, output: Path, drawing: str) -> str:
     if unproved:
         lines.append(f"senses of {', '.join(unproved)} are not proved: jog each by +10, write what was seen into the sheet")
     if made.unread:
-        lines.append(f"where {', '.join(made.unread)} lie is not proved: a pivot off by some mm passes every rule; touch a "
-                     "ball in several poses and write [touched] into the sheet, or run the check program")
+        lies = "lies" if len(made.unread) == 1 else "lie"
+        lines.append(f"where {', '.join(made.unread)} {lies} is not proved: a pivot off by some mm passes every rule; touch "
+                     "a ball in several poses and write [touched] into the sheet, or run the check program")
     lines.append(f"next: postproc convert part.cls -m {output} -c CONTROLLER --check-program check.nc proves the pivots")
     return "\n".join(lines)
 

@@ -137,10 +137,13 @@ def region_of(work: PassContext, space: Space, angles: Floats,
 
 
 def _unbounded(work: PassContext) -> PassContext:
-    """The same work on a machine whose slides never end, with the least safe planes."""
-    limits, slides = work.machine.limits, ~np.array(work.machine.rotary)
-    free = replace(limits, lower=np.where(slides, -np.inf, limits.lower),
-                   upper=np.where(slides, np.inf, limits.upper))
+    """The same work on a machine whose slides never end, with the least safe planes; nor do axes of a whole turn or more,
+    which a rewind brings back into their travel at any place."""
+    limits, ends = work.machine.limits, ~np.array(work.machine.rotary)
+    if work.setup.rewind.allowed:
+        ends |= limits.upper - limits.lower >= 2.0 * np.pi
+    free = replace(limits, lower=np.where(ends, -np.inf, limits.lower),
+                   upper=np.where(ends, np.inf, limits.upper))
     return replace(work, machine=replace(work.machine, limits=free),
                    space=replace(work.space, margin=_MARGIN * work.space.margin))
 

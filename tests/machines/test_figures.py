@@ -8,6 +8,8 @@ import pytest
 
 import machines
 from machines.loader import builtin
+from machines.machine import Machine
+from machines.plausible import implausible
 from tests.machine_page import PAGE, page
 
 FIGURES = ("travel", "velocity", "acceleration", "jerk")
@@ -16,11 +18,11 @@ DOCUMENTED = 30
 """machines with travel, speed and range of every axis from a document, that the catalogue holds at least"""
 
 
-def unsaid(name: str) -> list[str]:
+def unsaid(machine: Machine) -> list[str]:
     """Figures of a file that are neither assumed nor from a document."""
-    values = tomllib.loads(builtin()[name].read_text("utf-8"))
-    real = name in machines.catalogued()
-    said = set(machines.load(name).figures)
+    values = tomllib.loads(builtin()[machine.name].read_text("utf-8"))
+    real = machine.name in machines.catalogued()
+    said = set(machine.figures)
     keys = [f"{axis}.{key}" for axis in values["axes"] for key in (*FIGURES, *(("home",) if real else ()))]
     keys += [f"timing.{key}" for key in TIMES]
     if real:
@@ -30,8 +32,10 @@ def unsaid(name: str) -> list[str]:
 
 
 @pytest.mark.parametrize("name", [*machines.names(), *machines.catalogued()])
-def test_every_figure_is_sourced_or_assumed(name: str) -> None:
-    assert unsaid(name) == []
+def test_every_figure_is_sourced_or_assumed_and_plausible(name: str) -> None:
+    machine = machines.load(name)
+    assert unsaid(machine) == []
+    assert list(implausible(machine)) == []
 
 
 @pytest.mark.parametrize("name", machines.catalogued())

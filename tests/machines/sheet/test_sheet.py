@@ -126,6 +126,9 @@ HEAD = '[0, 0, 250.1], "I2" = [0.02, 0, 30], "I1" = [-0.02, 0, -280.1]'
 TOP = '[table_top]\nspindle_to_table = ["{}", "{}"]\nsize = "{}"\n[times]'
 SLOW = TRUNNION.replace('"22.9 m/min"', '"381 mm/min"').replace('"900 ipm"', '"381 mm/min"')
 """mm/s typed as mm/min for all slides"""
+IN_INCHES = '[0, 0, 9.85], "I2" = [0.0008, 0, 1.18], "I1" = [-0.0008, 0, -11.03]'
+FORK = NUTATED.replace('["C", "B"]', '["A", "B"]').replace("[C]", "[A]")
+BACKWARDS = '[0, 0, 250.1], "I2" = [0.02, 0, -130], "I1" = [-0.02, 0, -120.1]'
 UPSIDE_DOWN = '[0, 0, -250.1], "I2" = [0.02, 0, -30], "I1" = [-0.02, 0, 280.1]'
 
 
@@ -156,6 +159,14 @@ UPSIDE_DOWN = '[0, 0, -250.1], "I2" = [0.02, 0, -30], "I1" = [-0.02, 0, 280.1]'
     (TRUNNION, "[times]", TOP.format("102", "610 mm", "500 mm"), "sheet.figure", "'102' has no unit", "[table_top]"),
     (SLOW, "20 in", "20 in", ODD, "X goes at 6.35 mm/s at most, B at 300 deg/s", "rapid"),
     (TRUNNION.replace('"300 deg/s"', '"50 deg/min"'), '"50 rpm"', '"300 deg/min"', ODD, "B goes at 5 deg/s", "300 deg"),
+    (TRUNNION, MRZP, "[-381.02, 254.11, -558.4]", ODD, "B turns about a line at Y = 254.11", "points"),
+    (TRUNNION, MRZP, "[-558.4, -254.11, -381.02]", ODD, "with X and Z of it exchanged", "points"),
+    (TRUNNION, SECOND, "[-254.11, -381.05, -500.2]", ODD, "of it exchanged it is there", "points"),
+    (TRUNNION, MRZP, "[-250.0, -254.11, -558.4]", ODD, "C and B turn pass one another 131.05 mm apart", "points"),
+    (TRUNNION, 'travel = "20 in"', 'travel = "20 in"\nzero = "lower"', ODD, "stays far above it", "points"),
+    (TRUNNION, '"50 rpm"', '"300 deg/min"', ODD, "B turns at 5 deg/s, C at 300: 60 times", "deg/min"),
+    (NUTATED, HEAD, IN_INCHES, ODD, "B turns about a line only 9.85 mm above the gauge point", "points"),
+    (FORK, HEAD, BACKWARDS, ODD, "A, which carries B, turns about a line 130 mm below that of B", "points"),
     (TRUNNION, "rapid = ", "rapit = ", "file.unknown-key", "rapit", "rapit"),
 ])
 def test_a_slip_is_seen_at_its_line(tmp_path: Path, text: str, old: str, new: str, code: str, says: str,
@@ -199,6 +210,20 @@ def test_odd_figures_come_with_what_cannot_be_read(tmp_path: Path) -> None:
     found = made(tmp_path, text).diagnostics
     assert [d.lines[0] for d in found] == [line_of(text, part) for part in ('"762"', "22900 mm/s", "MRZP")], found
     assert made(tmp_path, TRUNNION).unread == ("B", "C")
+
+
+def test_one_cause_is_one_line(tmp_path: Path) -> None:
+    """A wrong end of a slide, or a number that both axes share, came once for each axis; a travel in the wrong unit with all
+    that is compared with it."""
+    for old, new in (('"762 mm"', '"762 mm"\nzero = "lower"'), ('"762 mm"', '"30 mm"'), (MRZP, "[-381.02, -254.11, 558.4]"),
+                     ('"22.9 m/min"', '"22.9 mm/min"')):
+        assert len(made(tmp_path, TRUNNION, old, new).diagnostics) == 1, new
+    (one,) = made(tmp_path, TRUNNION, '"22.9 m/min"', '"22.9 mm/min"').diagnostics
+    assert one.hint == "see to the unit of X rapid, which the sheet has as 22.9 mm/min"
+    (one,) = made(tmp_path, TRUNNION, '"300 deg/s"', '"3200 deg/s"').diagnostics
+    assert one.hint == "see to the unit of C rapid, which the sheet has as 3200 deg/s, or state its acceleration"
+    (one,) = made(tmp_path, NUTATED, '"I2"', '"I4"').diagnostics
+    assert "I4" in one.message and "I2 missing" in one.message, "a misspelt name"
 
 
 def test_a_misspelt_key_hides_no_wrong_figure(tmp_path: Path) -> None:
@@ -272,6 +297,8 @@ def test_pivots_of_each_control() -> None:
         points, wrong = points_of(form, ("B", "C"), (), {name: tuple(v) for name, v in given.items()})
         assert wrong == [], form
         np.testing.assert_allclose([points["B"], points["C"]], [b, c])
+    points, wrong = points_of("heidenhain", ("C",), ("B",), {"Trans 1": tuple(b), "Trans 2": tuple(c - b)})
+    np.testing.assert_allclose([points["B"], points["C"]], [b, c], err_msg="one sequence, from the tool on")
     points, wrong = points_of("haas", ("B", "C"), (), {"MRZP": tuple(b)})
     np.testing.assert_allclose([points["B"], points["C"]], [b, b])
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from postproc.placement.place_times import Timer
 from postproc.placement.region import Slabs, region_of
 from postproc.placement.search import PlaceSearch
 from postproc.placement.space import ANGLES, Space, matrix, space_of
-from postproc.setup.model import PartPlacement, Placement, SetupFile, load_setup, part_placement
+from postproc.setup.model import PartPlacement, Placement, RewindSettings, SetupFile, load_setup, part_placement
 from postproc.setup.place import PlacementLimits
 from tests.postproc.kit import SAMPLES, machine
 from tests.postproc.placement.test_placement import passes, placed, refused, setup_of
@@ -112,6 +113,29 @@ def test_margins_are_those_of_the_poses(name: str) -> None:
             slides = made.margins(timer.machine)[~np.array(timer.machine.rotary)]
             assert margin <= slides.min() + 1e-6
             assert (margin >= 0.0) == (not made.refused)
+
+
+def test_an_axis_that_rewinds_leaves_the_places_of_one_without_ends(tmp_path: Path) -> None:
+    """Where C of a whole turn ends in the middle of a cut it is unwound, at every place of the part."""
+    turns = np.radians(np.linspace(0.0, 1080.0, 40))
+    (tmp_path / "cone.apt").write_text("UNITS/MM\nMULTAX/ON\nLOADTL/1\nSPINDL/RPM,900,CLW\nFEDRAT/MMPM,300\n" + "".join(
+        f"GOTO/{12 * c:.4f},{12 * s:.4f},0,{0.6 * c:.6f},{0.6 * s:.6f},0.8\n" for c, s in zip(np.cos(turns), np.sin(turns),
+                                                                                         strict=True)))
+    path, m = toolpaths.read(tmp_path / "cone.apt")[0], machine("trunnion-bc")
+    c = np.array(m.axis_names) == "C"
+    ends = replace(m, limits=replace(m.limits, lower=np.where(c, np.radians(-200.0), m.limits.lower),
+                                     upper=np.where(c, np.radians(200.0), m.limits.upper)))
+    assert m.endless[c]
+    found, space = [], space_of(PlacementLimits(), Placement(np.eye(3), np.zeros(3)), (np.zeros(3), np.zeros(3)))
+    for one, allowed in ((ends, True), (m, True), (ends, False)):
+        work, _ = work_of(path, one, SetupFile(rewind=RewindSettings(allowed=allowed)), Options(), turning=False)
+        assert work is not None
+        found.append(region_of(work, space, np.zeros(3), 0.05))
+    (region, _), (same, _), (none, why) = found
+    places = np.array([[0.0, 0.0, 0.0], [40.0, -30.0, -90.0], [300.0, 0.0, 50.0]])
+    assert region is not None and same is not None
+    np.testing.assert_allclose(region.margins(places), same.margins(places), atol=1e-9)
+    assert none is None and "axis C" in str(why), "a set-up that forbids rewinds"
 
 
 def test_deepest_is_no_worse_than_any_place() -> None:
