@@ -1,7 +1,7 @@
 """Documents of the source tree that pages of the site name, as pages of the site; links of all pages, as the site has them.
 
 A page of `docs` links to the README of a room as it stands in the tree, so that the link also leads somewhere where the tree
-is read. `write_pages` copies each such document next to the generated pages, `linked` gives the links of a page their targets
+is read. `write_pages` copies each such document next to the generated pages, `linked` gives links of a page their targets
 in the site: pages and copies where there is one, else the words of the link alone. Nothing is left for the build to excuse.
 """
 
