@@ -20,15 +20,13 @@ from postproc.cli.calibrate import calibrate
 from postproc.cli.compare import EXAMPLE as DIFFERENCES
 from postproc.cli.compare import compare
 from postproc.cli.errors import errors_app
-from postproc.cli.machines_controllers import controller_app, machine_app, setup_app
+from postproc.cli.machines_controllers import SCHEMAS, controller_app, machine_app, schema, setup_app
 from postproc.cli.orient import EXAMPLES
 from postproc.cli.orient import orient as orient_command
 from postproc.cli.place import EXAMPLES as PLACES
 from postproc.cli.place import place
 from postproc.cli.report import EXAMPLE as REPORTS
 from postproc.cli.report import check_page, pages, report_command
-from postproc.cli.schema import EXAMPLES as SCHEMAS
-from postproc.cli.schema import schema
 from postproc.cli.shared.console import (
     Json,
     controller_of,
