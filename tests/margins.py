@@ -7,7 +7,7 @@ and written programs, of jobs, hints and pages, and those that rooms share; not 
 times, look at one part of the road by other means, or write reports, nor where LinuxCNC itself reads the program.
 
 Drawings are laid out and have their full number of dots in the tests of drawings; elsewhere panels stay where the grid puts
-them, which moves no text, and are rough.
+them, which moves no text, and are rough. What a model of errors does is looked at at few places of the travel.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from typing import Any
 
 import pytest
 
+from machines.geometric_error.exchange import exports, survey
 from postproc.pipeline import stages
 from postproc.verification import length_limits, read_back, second_witness
 from postproc.witness.evidence import Testimony
@@ -46,6 +47,8 @@ DRAWN = frozenset({"test_drawing.py", "test_sheet.py", "test_run.py"})
 """files that look at how drawings are laid out, and at the same bytes of processes of their own"""
 ROUGH = 40
 """dots per inch"""
+PLACES = 1000
+"""at which a model of errors is looked at, 20,000 in use"""
 
 
 def _none(*given: Any) -> tuple[()]:
@@ -69,6 +72,8 @@ def lengths_looked_at_where_they_are_seen(request: pytest.FixtureRequest) -> Ite
         if name not in DRAWN:
             patch.setattr(drawing, "_settle", _as_put)
             patch.setattr(drawing, "DOTS", ROUGH)
+        patch.setattr(survey, "PLACES", PLACES)
+        patch.setattr(exports, "WORST_PLACES", PLACES)
         if room in ROOMS and name not in SEEN:
             patch.setattr(read_back, NAME, _none)
         if room in UNHEARD and name not in HEARD:

@@ -40,12 +40,14 @@ def test_every_key_is_listed_with_a_test_that_states_it() -> None:
     from machines.models import AxisModel, ControlModel, TimingModel
     from postproc.setup import model as setup
     from postproc.setup.bodies import ToolBody
+    from postproc.setup.joints import Joints
+    from postproc.setup.places import PlaceSetup
 
     listed = {key: re.findall(r"`([^`]+)`", row[2]) for row in OPTIONS[1:]
               for key in re.findall(r"[a-z_]+", " ".join(re.findall(r"`([^`]+)`", row[0])))}
     keys = {key for one in (ControlModel, AxisModel, TimingModel) for key in one.model_fields} - MACHINE
-    keys |= {key for one in (setup.SetupFile, setup.PartPlacement, setup.LinkClearance, setup.ToolSetup, setup.OutputSettings,
-                             setup.RewindSettings, setup.Joints, setup.PlaceSetup) for key in one.model_fields}
+    keys |= {key for one in (setup.SetupFile, setup.PartPlacement, PlaceSetup, setup.LinkClearance, setup.ToolSetup,
+                             setup.OutputSettings, setup.RewindSettings, Joints) for key in one.model_fields}
     keys -= ELSEWHERE | set(ToolBody.model_fields)
     assert keys - set(listed) == set()
     texts = {key: "".join((ROOT / "tests" / name).read_text("utf-8") for name in names) for key, names in listed.items()}

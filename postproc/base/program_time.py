@@ -101,8 +101,11 @@ class OptimisedStep:
 
 @dataclass(frozen=True)
 class Optimised:
-    """What `--optimise` came to: choices taken in order, time without it and with it, number of choices tried; s that no sharing
-    of the tolerance beats (a control and the program's points with all of it each), 0 where that is not known."""
+    """What `--optimise` came to: choices taken in order, time without it and with it, number of choices tried.
+
+    `least`: s that no sharing of the tolerance beats (the control and the program's points with all of it each), 0 where
+    that is not known.
+    """
 
     steps: tuple[OptimisedStep, ...]
     before: ProgramTime

@@ -9,7 +9,7 @@ import numpy as np
 from postproc.clock.allowed import NO_MOTION, SLOWEST, Allowed, allowed
 from postproc.clock.landing import landed, short_move
 from postproc.clock.path import BlendedPath, CommandedPath, blended, sharp
-from postproc.clock.settings import ControlSettings
+from postproc.clock.settings import BACKWARD, ControlSettings
 from postproc.clock.speed_kernels import run, slow_down
 from toolpaths.arrays import Bools, Floats
 from toolpaths.compiled import chosen
@@ -29,8 +29,6 @@ GENTLE = 0.95
 GENTLER, LAST, AGAIN = (0.94, 0.93, 0.92, 0.9), 30, 160
 """other such shares; cycles before a rest in which a motion that speeds up again has slowed down too early, and from which
 it is tried again"""
-BACKWARD = -0.94
-"""cosine of the change of direction below which the axes rest: 160 degrees"""
 NEAR, LEAST = 2, 0.8
 """cycles around such a place that become slower, and the share of the speed that is left at least each time"""
 

@@ -10,6 +10,8 @@ from toolpaths.shapes import arrays
 
 STEEPEST = 0.02
 """s in which full acceleration is built up where no jerk is stated"""
+BACKWARD = -0.94
+"""cosine of the change of direction below which the axes rest: 160 degrees"""
 PLANNED = 0.98
 """of the jerks is planned with: the rest is for what changes within a cycle"""
 

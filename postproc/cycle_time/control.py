@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.clock.control import BACKWARD, ControlMotion, execute
+from postproc.clock.control import ControlMotion, execute
 from postproc.clock.path import CommandedPath
 from postproc.clock.settings import ControlSettings
 from postproc.cycle_time.blocks import CornerMode, MotionBlocks
-from postproc.cycle_time.lookahead import TANGENT, directions, limits, lookahead
+from postproc.cycle_time.lookahead import limits, lookahead, rests
 from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.phases import BlockTimes, summed
 from postproc.cycle_time.shape import Shape, shape
@@ -79,17 +79,6 @@ def commanded(blocks: MotionBlocks, model: CycleTimeModel, form: Shape, stops: B
     smoothing = np.full(len(weight), model.smoothing) if model.smoothing > 0.0 else None
     return path, ControlSettings(axes.velocity, axes.acceleration, jerk, model.lookahead, model.block_time, model.cycle,
                                  model.bend_acceleration, model.bend_jerk, step, smoothing), owner
-
-
-def rests(blocks: MotionBlocks, form: Shape) -> Bools:
-    """(E,) where the axes rest at the end: by command, exact stop, corner of an exact path, between rapid and feed."""
-    d = directions(blocks, form)
-    change = np.abs(d.first[1:] - d.last[:-1]).max(axis=1, initial=0.0)
-    exact = (blocks.path[:-1] == CornerMode.EXACT) & (change > TANGENT)
-    forward = (form.last[:-1] * form.first[1:]).sum(axis=1)
-    exact |= forward < BACKWARD
-    stop = blocks.forced[:-1] | (blocks.path[:-1] == CornerMode.STOP) | exact | (blocks.rapid[1:] != blocks.rapid[:-1])
-    return np.append(stop, True)
 
 
 def pieces(blocks: MotionBlocks, form: Shape) -> tuple[Floats, Floats, Ints]:

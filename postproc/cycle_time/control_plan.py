@@ -18,8 +18,9 @@ from postproc.clock.control import between_rests, looked_over
 from postproc.clock.path import BlendedPath
 from postproc.clock.settings import ControlSettings
 from postproc.cycle_time.blocks import MotionBlocks
-from postproc.cycle_time.control import MOST_BLOCKS, MOST_STOPS, commanded, feeds, rests
+from postproc.cycle_time.control import MOST_BLOCKS, MOST_STOPS, commanded, feeds
 from postproc.cycle_time.estimate import as_used
+from postproc.cycle_time.lookahead import rests
 from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.shape import shape
 from postproc.cycle_time.source import from_conversion

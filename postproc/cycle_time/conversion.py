@@ -74,13 +74,14 @@ class ControlClock:
         return self._time(result, planner.quick(), False, blocks, sampled(blocks, planner.of_machine(result.machine)).times)
 
     def least(self, result: PostResult) -> float:
-        """Where the control had the whole tolerance for itself, whatever the program's points use of it, s: no way of sharing it
-        is faster. 0 where more tolerance need not make a control faster."""
+        """s where the control had the whole tolerance for itself, whatever the program's points use of it: no way of sharing
+        it is faster. 0 where more tolerance need not make a control faster."""
         planner = _model(result, self.model)
         if planner.kind != "linuxcnc":
             return 0.0
         blocks = from_conversion(result)
-        whole = np.where(np.isfinite(blocks.tolerance), np.maximum(blocks.tolerance, result.options.tolerance), blocks.tolerance)
+        stated = blocks.tolerance
+        whole = np.where(np.isfinite(stated), np.maximum(stated, result.options.tolerance), stated)
         return self._time(result, planner, False, replace(blocks, tolerance=whole)).seconds
 
     def plan(self, made: PostResult) -> ControlPlan | None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from postproc.clock.settings import BACKWARD
 from postproc.cycle_time.bends import bend_speed
 from postproc.cycle_time.blocks import CornerMode, MotionBlocks
 from postproc.cycle_time.linuxcnc_kernels import speeds
@@ -101,6 +102,18 @@ def _stops(blocks: MotionBlocks, change: Floats) -> Bools:
     exact = (blocks.path[:-1] == CornerMode.EXACT) & (change.max(axis=1, initial=0.0) > TANGENT)
     return np.asarray(blocks.forced[:-1] | (blocks.path[:-1] == CornerMode.STOP) | exact
                       | (blocks.rapid[1:] != blocks.rapid[:-1]))
+
+
+def rests(blocks: MotionBlocks, form: Shape) -> Bools:
+    """(E,) where the axes of an executed control rest at the end: by command, exact stop, corner of an exact path, between
+    rapid and feed, where it turns back."""
+    d = directions(blocks, form)
+    change = np.abs(d.first[1:] - d.last[:-1]).max(axis=1, initial=0.0)
+    exact = (blocks.path[:-1] == CornerMode.EXACT) & (change > TANGENT)
+    forward = (form.last[:-1] * form.first[1:]).sum(axis=1)
+    exact |= forward < BACKWARD
+    stop = blocks.forced[:-1] | (blocks.path[:-1] == CornerMode.STOP) | exact | (blocks.rapid[1:] != blocks.rapid[:-1])
+    return np.append(stop, True)
 
 
 def window(length: Floats, rate: Floats, count: int) -> Floats:

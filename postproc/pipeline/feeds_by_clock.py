@@ -14,6 +14,7 @@ import numpy as np
 
 from postproc.base.program_time import ControlPlan, FeedTimes, ProgramTime
 from postproc.pipeline.result import PostResult
+from postproc.planning.planned_source import limits_not_kept
 
 
 class ProgramClock(Protocol):
@@ -55,7 +56,7 @@ def ranked(clock: ProgramClock, made: PostResult) -> ProgramTime:
 
 def with_compared_feeds(start: PostResult, stages: StagedWhole, clock: ProgramClock | None) -> PostResult:
     """The program with planned feeds, and what they do; the programmed feeds where the control makes its ramps itself and
-    planned ones take longer, unless tools have limits of their own, which only planned feeds keep. Other conversions as they
+    planned ones take longer, unless tools or motors have limits that only planned feeds keep. Other conversions as they
     are."""
     made = stages(start)
     if clock is None or start.options.feed != "planned" or not made.ok or made.motion is None or not made.motion.passes:
@@ -69,7 +70,7 @@ def with_compared_feeds(start: PostResult, stages: StagedWhole, clock: ProgramCl
         made = carried if carried.ok else made
     planned, programmed = measured(clock, made), measured(clock, plain)
     slower = planned.seconds > programmed.seconds
-    kept = not start.controller.feed.limited_jerk and slower and not (made.motion is not None and made.motion.source.tools)
+    kept = not start.controller.feed.limited_jerk and slower and not (made.job and limits_not_kept(made.job))
     ideal = 0.0 if made.motion is None else made.motion.seconds
     plan = ideal if found is None or made.control_plan is None else found.seconds
     times = FeedTimes(programmed, planned, _stated(plain), _stated(made), plan, ideal, kept)

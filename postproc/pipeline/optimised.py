@@ -105,8 +105,8 @@ class _Search:
         return time.seconds
 
     def least(self) -> float:
-        """s that no sharing of the tolerance beats: as few blocks as all of it allows, on a control that has all of it too; 0
-        where that is not known."""
+        """s that no sharing of the tolerance beats: as few blocks as all of it allows, on a control that has all of it too;
+        0 where that is not known."""
         if not isinstance(self.clock, PlanningClock):
             return 0.0
         change = partial(replace, off_path=True, filled=True, smoothing=LITTLE * self.best.start.options.tolerance)

@@ -190,7 +190,8 @@ def stages() -> dict[str, Stage]:
                      " --figures pictures": "", "-m trunnion-bc -c fanuc-30i": "-c fanuc-30i",
                      "orient part.cls": "orient part.cls --max-tilt 5", "--orient auto": "--orient auto --max-tilt 5"}),
         "docs/how-to/calibrate-the-time.md": Stage(  # so small a part leaves nothing to measure: test every move
-            instead={"time part.nc -m mikron-ucp710 -c siemens-840d --plan": "time -m mikron-ucp710 -c siemens-840d --plan"},
+            instead={"time part.nc -m mikron-ucp710 -c siemens-840d --plan": "time -m mikron-ucp710 -c siemens-840d --plan",
+                     "--plan-seconds 60": "--plan-seconds 25"},
             files={name: program("siemens-840d") for name in ("part.nc", "next.nc")},
             before={"time part.nc -m mikron-ucp710 -c siemens-840d --calib": partial(logged, "part.nc", "siemens-840d")}),
         "docs/how-to/from-nx.md": MACHINE,

@@ -15,7 +15,6 @@ import pytest
 from pygments.lexers import get_lexer_by_name
 from typer.main import get_command
 
-from machines.geometric_error.exchange import survey
 from postproc.cli.app import app
 from postproc.cli.batch import wrong_use
 from postproc.cli.shared.schemas import FILES, file_schema
@@ -40,7 +39,6 @@ HOW_TOS = 20
 
 @pytest.mark.parametrize("page", EXECUTED, ids=[str(p.relative_to(ROOT)) for p in EXECUTED])
 def test_a_page_does_what_it_says(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(survey, "PLACES", 1000)  # where `errors` looks at a model
     monkeypatch.setattr(what_if, "EXECUTED_MOST", 1)  # limits that a report of an executed control tries
     for name, value in FEW_PLACES.items():
         monkeypatch.setattr(f"machines.analysis.{name}", value)

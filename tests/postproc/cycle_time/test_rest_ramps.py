@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.cycle_time.bound import lower_bound
+from postproc.cycle_time.bound import from_rest, lower_bound
 from postproc.cycle_time.estimate import timed, total
-from postproc.cycle_time.rest_ramps import from_rest
 from tests.postproc.time_kit import HEAD, blocks, machine, model
 
 STEP = 1e-3

@@ -14,6 +14,7 @@ import pytest
 from typer.testing import CliRunner
 
 import postproc
+from machines.dynamics_models import AxisMassModel, DynamicsModel
 from postproc.cli.app import app
 from postproc.cycle_time.planned import planned_times
 from postproc.cycle_time.source import from_conversion
@@ -151,6 +152,19 @@ def test_limits_that_nobody_keeps_are_named(tmp_path: Path) -> None:
     assert plain.exit_code == 0 == planned.exit_code, plain.output + planned.output
     assert "setup.tool_limits" in plain.output and "--feed planned" in plain.output
     assert "setup.tool_limits" not in planned.output
+
+
+def test_the_cutting_force_of_a_tool_is_taken_off_the_motors() -> None:
+    """On an arc of 20 mm at 3000 mm/s2 of X, of which the cut takes four fifths, planned feeds are no more than
+    (600 20) ** 0.5 mm/s, and those of the CL file, 500 mm/s, do not take their place for that."""
+    mill, at = machine("mill-3axis"), np.linspace(0.0, 0.2, 16)
+    axes = {name: AxisMassModel(mass=50.0, force=force) for name, force in zip("XYZ", (150.0, 300.0, 3000.0), strict=True)}
+    round_ = [f"GOTO/{20 * np.cos(a):.5f},{20 * np.sin(a):.5f},5" for a in at]
+    result = good(postproc.convert(
+        toolpath("RAPID", round_[0], "FEDRAT/MMPM,30000", *round_[1:]), replace(mill, dynamics=DynamicsModel(axes=axes)),
+        "linuxcnc", SetupFile(tools={"1": ToolSetup(gauge_length=90.0, cutting_force=120.0)}),
+        postproc.Options(feed="planned")))
+    assert np.nansum(result.feeds.seconds) > 20.0 * at[-1] / 120.0
 
 
 def test_the_fingerprint_counts_limits_that_are_stated() -> None:

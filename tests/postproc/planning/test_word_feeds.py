@@ -14,7 +14,7 @@ from postproc.controllers.model import load_controller
 from postproc.cycle_time import control
 from postproc.cycle_time.conversion import program_clock
 from postproc.cycle_time.estimate import timed
-from postproc.cycle_time.lookahead import limits
+from postproc.cycle_time.lookahead import limits, rests
 from postproc.cycle_time.model import load_model
 from postproc.cycle_time.shape import shape
 from postproc.cycle_time.source import from_conversion
@@ -58,7 +58,7 @@ def on_the_control(result: PostResult, name: str = REFERENCE) -> tuple[float, li
     assert model is not None
     model, blocks = model.of_machine(result.machine), from_conversion(result)
     form = shape(blocks)
-    moved, _ = control.motion(blocks, model, form, control.rests(blocks, form), limits(blocks, form, model)[0])
+    moved, _ = control.motion(blocks, model, form, rests(blocks, form), limits(blocks, form, model)[0])
     found, used = moved.axes(), moved.settings
     jerk = np.abs(found.qddd / used.jerk).max(axis=1)
     shares = [float(np.abs(found.qd / used.velocity).max()), float(np.abs(found.qdd / used.acceleration).max()),

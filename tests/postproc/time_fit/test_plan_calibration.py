@@ -38,7 +38,7 @@ TRUTHS = (pytest.param({"corner_tolerance": 0.004, "stated_share": 0.4, "rapid":
 def program() -> MotionBlocks:
     """A zigzag with rapids and arcs, as a shop has it."""
     text = ["G21 G90 G94 G17", "G0 X0 Y0 Z300", "S1000 M3", "F2500"]
-    for k in range(60):
+    for k in range(42):
         text.append(f"G1 X{(k % 2) * 35 + k % 3} Y{k * 0.8:.3f}")
         text += ["G0 Z310", f"G0 X{-20 + k}", "G0 Z300"] if k % 6 == 5 else []
     return blocks("\n".join(text), machine(timing=True), controller="generic-iso")

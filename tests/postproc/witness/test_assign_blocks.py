@@ -11,6 +11,7 @@ from postproc.witness import assign_blocks
 
 
 @pytest.mark.numeric
+@pytest.mark.slow  # make numeric
 @pytest.mark.parametrize("folder", [True, False])
 def test_compiled_and_interpreted_loops_agree(folder: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """Blocks of which every third ends at a position that the file commands; with and without a folder for machine code."""
