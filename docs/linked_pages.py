@@ -1,8 +1,8 @@
 """Documents of the source tree that pages of the site name, as pages of the site; links of all pages, as the site has them.
 
 A page of `docs` links to the README of a room as it stands in the tree, so that the link also leads somewhere where the tree
-is read. `write_pages` copies each such document next to the generated pages, `linked` writes the links of a page anew: to pages
-and copies where there is one, else as the words of the link alone. Nothing is left for the build to excuse.
+is read. `write_pages` copies each such document next to the generated pages, `linked` gives links of a page their targets
+in the site: pages and copies where there is one, else the words of the link alone. Nothing is left for the build to excuse.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ def _link(found: re.Match[str], source: Path, page: Path, copied: dict[Path, Pat
     if place is None:
         return found[0]
     there = copied.get(place, place)
-    if DOCS not in there.parents or not there.is_file():
+    if DOCS not in there.parents or (there == place and not (place.is_file() or "generated" in place.parts)):
         return found["words"]
-    heading = found["target"].partition("#")[2]
-    return f"[{found['words']}]({os.path.relpath(there, page.parent)}{'#' + heading if heading else ''})".replace(os.sep, "/")
+    _, sign, heading = found["target"].partition("#")
+    return f"[{found['words']}]({os.path.relpath(there, page.parent)}{sign}{heading})".replace(os.sep, "/")
 
 
 def _place(target: str, page: Path) -> Path | None:

@@ -16,6 +16,7 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from postproc.cli.app import app
+from postproc.cli.shared.schemas import FILES, RESULTS, file_schema, result_schema
 from postproc.explain.pages import CodePage, pages
 
 
@@ -29,6 +30,26 @@ def write_pages(folder: Path) -> None:
     for code, page in pages().items():
         (folder / "codes" / f"{code}.md").write_text(code_page(page), encoding="utf-8")
     (folder / "codes.md").write_text(codes_page(), encoding="utf-8")
+    (folder / "results.md").write_text(results_page(), encoding="utf-8")
+    write_schemas(folder / "pages" / "schemas")
+
+
+def write_schemas(folder: Path) -> None:
+    """Each schema as a file of the site, by the name that `postproc schema` takes."""
+    folder.mkdir(parents=True)
+    for name, schema in [*((one, file_schema(one)) for one in FILES), *((one, result_schema(one)) for one in RESULTS)]:
+        (folder / f"{name.replace(' ', '-')}.json").write_text(json.dumps(schema, indent=2) + "\n", encoding="utf-8")
+
+
+def results_page() -> str:
+    """Keys that stay of what each command writes, and where its schema is."""
+    parts = ["# JSON of each command: keys that stay", "", "`postproc schema COMMAND` prints the schema. In every object "
+             "stand `schema_version`, `ok` and `diagnostics` too; more keys may come.", ""]
+    for command, keys in RESULTS.items():
+        parts += [f"## {command}", "", f'<a href="../../schemas/{command.replace(" ", "-")}.json">Its schema</a>', "",
+                  *(["| key | type |", "|---|---|", *(f"| `{key}` | {kind} |" for key, kind in keys.items())] if keys else
+                    ["No further keys."]), ""]
+    return "\n".join(parts)
 
 
 def commands_page() -> str:
@@ -51,25 +72,11 @@ def _commands(command: Any, words: tuple[str, ...]) -> Iterator[tuple[str, ...]]
             yield (*words, name)
 
 
-def schemas() -> Iterator[tuple[str, str, Mapping[str, Any]]]:
-    """(name of the page, what the file is, JSON schema) of each file that users write."""
-    import machines
-    from machines.user_model import schema
-    from postproc.batch.model import BatchFile
-    from postproc.controllers.model import ControllerFile
-    from postproc.setup.job_file import JobFile
-    from postproc.setup.model import SetupFile
-
-    yield "machine-file", "Machine file", machines.schema()
-    yield "setup-file", "Set-up file", schema("setup", SetupFile)
-    yield "controller-file", "Controller file", schema("controller", ControllerFile)
-    yield "job-file", "postproc.toml", schema("job", JobFile)
-    yield "batch-file", "Batch file", schema("batch", BatchFile)
-
-
 def key_pages() -> Iterator[tuple[str, str]]:
     """A table of keys for each file that users write."""
-    for name, title, schema in schemas():
+    for name in FILES:
+        schema = file_schema(name)
+        title = "postproc.toml" if name == "job-file" else name.replace("-", " ").capitalize()
         rows = ["| key | type | default | meaning |", "|---|---|---|---|"]
         tops = [schema["$defs"][_name_of(one)] for one in schema.get("anyOf", [])] or [schema]
         seen: set[str] = set()

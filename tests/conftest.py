@@ -16,6 +16,7 @@ from tests import (
     machines_once,
     one_command,
     processor_time,
+    results_checked,
     rewrite_once,
     said,
     tiers,
@@ -38,6 +39,7 @@ __all__ = ["environment", "lengths_looked_at_where_they_are_seen", "pytest_runte
 gc.disable()
 rewrite_once.install()
 machines_once.install()
+results_checked.install()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -1,4 +1,4 @@
-"""Every JSON object that a command writes in any test is held to its published schema, by a reading of schemas of its own."""
+"""Every JSON object that a command writes in any test is held to its published schema, by its own reading of schemas."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from postproc.cli.shared import console
 from postproc.cli.shared.schemas import result_schema
 
 TYPES: Mapping[str, tuple[type, ...]] = {
-    "string": (str,), "integer": (int, np.integer), "number": (int, float, np.integer, np.floating), "boolean": (bool, np.bool_),
-    "array": (list, tuple, np.ndarray), "object": (Mapping,), "null": (type(None),)}
+    "string": (str,), "integer": (int, np.integer), "number": (int, float, np.integer, np.floating),
+    "boolean": (bool, np.bool_), "array": (list, tuple, np.ndarray), "object": (Mapping,), "null": (type(None),)}
 
 
 def faults(schema: Mapping[str, Any], value: Any) -> list[str]:
@@ -26,7 +26,8 @@ def faults(schema: Mapping[str, Any], value: Any) -> list[str]:
     found += [f"no key {key}" for key in schema.get("required", ()) if key not in value]
     found += [f"{key}: {fault}" for key, below in schema.get("properties", {}).items() if key in value
               for fault in faults(below, value[key])]
-    found += [f"{k}: {fault}" for k, one in enumerate(value if "items" in schema else ()) for fault in faults(schema["items"], one)]
+    found += [f"{k}: {fault}" for k, one in enumerate(value if "items" in schema else ())
+              for fault in faults(schema["items"], one)]
     if "if" in schema and not faults(schema["if"], value):
         found += faults(schema["then"], value)
     return found

@@ -9,6 +9,7 @@ A test that is named there must be told the same again, figures apart, whenever 
 from __future__ import annotations
 
 import json
+import os
 import re
 import sys
 import tomllib
@@ -30,6 +31,8 @@ WIDE, LONG = 160, 700
 _FOLDER = re.compile(r"(?<![\w.])/(?:[^\s/'\",;:]+/)+")
 _FIGURE = re.compile(r"[-+]?\d[\d.,e+-]*|\bnan\b")
 _SAMPLE = re.compile(r"(?:^|/)samples/")
+_HERE = f"{Path(__file__).parents[1]}{os.sep}"
+"""of this tree, whose folders may have blanks"""
 Said = dict[str, Any]
 """code, text, command, record, test of something said"""
 
@@ -58,7 +61,7 @@ def shown(one: Said) -> str:
 
 def _bare(text: str) -> str:
     """A text without the folders of files."""
-    return _FOLDER.sub("", text)
+    return _FOLDER.sub("", text.replace(_HERE, "/tree/"))
 
 
 def _alike(text: str) -> str:

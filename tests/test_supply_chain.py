@@ -42,7 +42,8 @@ def test_a_licence_is_found_wherever_a_package_states_it() -> None:
 
 def test_what_is_pinned_installs_on_the_oldest_python() -> None:
     """Debian 12 has 3.11.2: a pinned version that asks for a later one ends `make demo` and the container there."""
-    oldest = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["requires-python"].removeprefix(">=") + ".0"
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    oldest = project["requires-python"].removeprefix(">=") + ".0"
     asked = {one.metadata["Name"]: one.metadata.get("Requires-Python") or "" for one in distributions()
              if re.sub(r"[-_.]+", "-", one.metadata["Name"]).lower() in locked()}
     assert len(asked) > 50

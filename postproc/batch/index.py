@@ -26,7 +26,7 @@ _HEADS = {"outcome": "Outcome", "job": "Job", "file": "File", "machine": "Machin
 _STYLE = """body{font:15px/1.45 system-ui,sans-serif;margin:2rem;color:#1b1b1b;background:#fff}
 table{border-collapse:collapse;width:100%}
 th,td{text-align:left;vertical-align:top;padding:.3rem .6rem;border-bottom:1px solid #d0d0d0}
-th{position:sticky;top:0;background:#f2f2f2}td.n{text-align:right;font-variant-numeric:tabular-nums}
+th{position:sticky;top:0;background:#f2f2f2}td.n{text-align:right;white-space:nowrap;font-variant-numeric:tabular-nums}
 .done{color:#00591d}.refused,.use,.fault,.lost{color:#9c1c00;font-weight:600}.not{color:#5a5a5a}
 td{overflow-wrap:anywhere}@media print{th{position:static}}"""
 IndexRow = dict[str, Any]

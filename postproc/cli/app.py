@@ -20,7 +20,7 @@ from postproc.cli.calibrate import calibrate
 from postproc.cli.compare import EXAMPLE as DIFFERENCES
 from postproc.cli.compare import compare
 from postproc.cli.errors import errors_app
-from postproc.cli.machines_controllers import controller_app, machine_app, setup_app
+from postproc.cli.machines_controllers import SCHEMAS, controller_app, machine_app, schema, setup_app
 from postproc.cli.orient import EXAMPLES
 from postproc.cli.orient import orient as orient_command
 from postproc.cli.place import EXAMPLES as PLACES
@@ -90,6 +90,7 @@ app.command("orient", epilog=EXAMPLES)(orient_command)
 app.command(epilog=PLACES)(place)
 app.command("report", epilog=REPORTS)(report_command)
 app.command(epilog=BATCHES)(batch)
+app.command(epilog=SCHEMAS)(schema)
 app.command(epilog=DIFFERENCES)(compare)
 
 Setup = Annotated[str, typer.Option("--setup", metavar="S.toml", help="set-up file: placement, tools, safe distances")]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from toolpaths.arrays import Floats
     from toolpaths.choices import FigureEnding
 
+SCHEMAS = "Examples: postproc schema setup-file; postproc schema machine check"
 machine_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
                           help="Machines: new, list, show, check, analyse, certify, design and more.")
 controller_app = typer.Typer(cls=Group, no_args_is_help=True, rich_markup_mode=None,
@@ -143,9 +144,9 @@ def machine_check(file: Annotated[str, typer.Argument(help="TOML file or name")]
 @machine_app.command("schema")
 def machine_schema() -> None:
     """Print the JSON schema of a machine file."""
-    import machines
+    from postproc.cli.shared.schemas import file_schema
 
-    print_json(machines.schema())
+    print_json(file_schema("machine-file"))
 
 
 @setup_app.command("check", epilog="Example: postproc setup check part.setup.toml")
@@ -174,10 +175,9 @@ def setup_check(file: Annotated[str, typer.Argument(help="TOML file")], json: Js
 @setup_app.command("schema")
 def setup_schema() -> None:
     """Print the JSON schema of a set-up file."""
-    from machines.user_model import schema
-    from postproc.setup.model import SetupFile
+    from postproc.cli.shared.schemas import file_schema
 
-    print_json(schema("setup", SetupFile))
+    print_json(file_schema("setup-file"))
 
 
 @controller_app.command("list")
@@ -204,7 +204,24 @@ def controller_show(name: Annotated[str, typer.Argument(help="name or TOML file"
 @controller_app.command("schema")
 def controller_schema() -> None:
     """Print the JSON schema of a controller file."""
-    from machines.user_model import schema
-    from postproc.controllers.model import ControllerFile
+    from postproc.cli.shared.schemas import file_schema
 
-    print_json(schema("controller", ControllerFile))
+    print_json(file_schema("controller-file"))
+
+
+def schema(what: Annotated[list[str] | None, typer.Argument(metavar="NAME", help="a file that users write, or the words of "
+                                                            "a command; left out: the list of both")] = None) -> None:
+    """Print the JSON schema of a file that users write, or of what a command writes with --json."""
+    from postproc.cli.shared.schemas import FILES, RESULTS, file_schema, result_schema
+
+    name = " ".join(what or ())
+    if not name:
+        typer.echo("\n".join(["files:", *(f"  {one}" for one in FILES), "results of commands (--json):",
+                              *(f"  {one}" for one in RESULTS)]))
+    elif name in FILES or name in RESULTS:
+        found: dict[str, Any] = file_schema(name) if name in FILES else result_schema(name)
+        print_json(found)
+    else:
+        from machines.user_file import nearest
+
+        raise typer.BadParameter(f"no file and no command {name!r}; {nearest(name, [*FILES, *RESULTS])}", param_hint="NAME")

@@ -17,6 +17,7 @@ from typer.main import get_command
 
 from postproc.cli.app import app
 from postproc.cli.batch import wrong_use
+from postproc.cli.shared.schemas import FILES, file_schema
 from postproc.explain.pages import pages
 from postproc.page import what_if
 from postproc.setup.model import load_setup
@@ -54,6 +55,31 @@ def test_no_command_and_no_python_is_left_out() -> None:
         assert kinds <= {"console", "python", "toml", "ini", *PLAIN}, page
     for page, test in ELSEWHERE.items():
         assert Path(page).name in (ROOT / test).read_text("utf-8"), page
+
+
+LINKED = runpy.run_path(str(ROOT / "docs" / "linked_pages.py"))
+REPORTS = "../reports/"
+"""where the site has reports, from pages of explanations (docs/conf.py)"""
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[p.name for p in PAGES])
+def test_links_of_pages_lead_somewhere(page: Path) -> None:
+    """To a page, or to a document of the tree, which the site has as a page; a link to what only the site has is HTML."""
+    text = page.read_text("utf-8")
+    for found in LINKED["LINK"].finditer(text):
+        place = LINKED["_place"](found["target"], page)
+        assert place is None or "generated" in place.parts or place.is_file(), found[0]
+    assert f"]({REPORTS}" not in text
+    assert not [words for words in LINKED["LINK"].findall(LINKED["linked"](text, page)) if not words[1]]
+
+
+def test_documents_of_the_tree_are_pages_of_the_site(tmp_path: Path) -> None:
+    linked, source, page = LINKED["linked"], ROOT / "postproc" / "x.md", ROOT / "docs" / "how-to" / "page.md"
+    assert linked("[a](../../ARCHITECTURE.md#rooms)", page) == "[a](../reference/generated/tree/ARCHITECTURE.md#rooms)"
+    same = "[a](rewinds.md), [b](https://x.org/y.md), [c](#d)"
+    assert linked(same, page) == same
+    assert linked("[a](cli/app.py), ![p](../samples/blade.svg)", source, page) == "a, ![p](../samples/blade.svg)"
+    assert linked("[a](../docs/glossary.md)", source, page) == "[a](../glossary.md)"
 
 
 def test_a_command_of_a_readme_that_fails_is_noticed(tmp_path: Path) -> None:
@@ -134,7 +160,7 @@ def test_lines_of_files_are_such_as_there_are(tmp_path: Path) -> None:
     """TOML that a page shows without making it a file of its commands."""
     found = [(page.name, block) for page in PAGES for block in blocks(page.read_text("utf-8"))]
     shown = [(name, block.text) for name, block in found if block.kind == "toml" and not block.file]
-    known = {kind: keys_of(schema) for kind, _, schema in runpy.run_path(str(ROOT / "docs/reference_pages.py"))["schemas"]()}
+    known = {kind: keys_of(file_schema(kind)) for kind in FILES}
     assert len(shown) >= 12 and "travel" in known["machine-file"] and "rods" in known["machine-file"]
     for name, text in shown:
         if name in OTHER_FILES:

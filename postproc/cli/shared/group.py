@@ -38,7 +38,7 @@ def width() -> int:
 
 
 ORDER = ("convert", "verify", "compare", "inspect", "trace", "time", "report", "orient", "place", "calibrate", "errors",
-         "machine", "controller", "setup", "batch")
+         "machine", "controller", "setup", "batch", "schema")
 """commands as the help lists them, the first ones first; others follow"""
 RUN_OTHERS = ("batch",)
 """commands that look at the options of others, and run them"""

@@ -1,4 +1,4 @@
-"""JSON schemas: of the files that users write, from their models; of what commands write with --json, from `results.toml`."""
+"""JSON schemas: of files that users write, from their models; of what commands write with --json, from `results.toml`."""
 
 from __future__ import annotations
 

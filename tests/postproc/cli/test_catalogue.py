@@ -71,7 +71,8 @@ def undescribed(schema: Any) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("command", [
-    "machine schema", "controller schema", "setup schema", "errors schema", "calibrate --schema"])
+    "machine schema", "controller schema", "setup schema", "errors schema", "calibrate --schema",
+    "schema job-file", "schema batch-file"])
 def test_a_schema_says_what_each_key_is(command: str) -> None:
     got = CliRunner().invoke(app, command.split())
     assert got.exit_code == 0 and list(undescribed(json.loads(got.stdout))) == []
