@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -155,3 +156,11 @@ class _Scanner:
                 self.at += 1
                 self._blank()
         self.at += 1
+
+
+def dotted(path: Sequence[str | int]) -> str:
+    """("axes", 0, "name") as axes[0].name"""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text

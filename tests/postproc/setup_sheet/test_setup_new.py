@@ -278,6 +278,7 @@ def test_convert_reports_all_that_is_missing_at_once_and_the_command_it_offers_w
     got = run(*words, code=1)
     expected = {"tool.number", "spindle.not_started", "feed.missing"}
     assert set(re.findall(r"error \[([\w.]+)\]", got.stderr)) == expected
+    assert ("where the part stands on the table" in got.stderr) == (machine_name == "head-table"), "it depends on it"
     offered = re.search(r"(postproc setup new .*?\.toml) asks", got.stderr)
     assert offered
     run(*shlex.split(offered[1])[1:], "--yes")
