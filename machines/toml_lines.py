@@ -164,3 +164,9 @@ def dotted(path: Sequence[str | int]) -> str:
     for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
     return text
+
+
+def table_named(path: KeyPath) -> str:
+    """("axes", "X") as [axes.X], ("places", 0) as table 1 of places: one of a list has no name that a file could hold."""
+    last = path[-1]
+    return f"table {last + 1} of {dotted(path[:-1])}" if isinstance(last, int) else f"[{dotted(path)}]"

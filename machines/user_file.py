@@ -18,7 +18,7 @@ from typing import Any, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from machines.toml_lines import KEPT, SHORT, KeyPath, Values, dotted, own_copy, parsed
+from machines.toml_lines import KEPT, SHORT, KeyPath, Values, dotted, own_copy, parsed, table_named
 from machines.user_model import SCHEMA_KEY, key_texts
 from machines.value_words import POINT, advice, allowed, decimal_comma
 from toolpaths.cl.text.kinds_of_file import what_is
@@ -200,7 +200,7 @@ def _text(path: FilePath, source: str, builtin: Mapping[str, FilePath], kind: st
     except FileNotFoundError:
         what = f"no {kind} is called {source!r}" + ("" if source in builtin else " and there is no such file")
         return None, error("file.not-found", what if builtin else f"there is no file {shown(path)}", file=file, lines=lines,
-                           hint=nearest(source.removesuffix(".toml"), sorted(builtin)) or f"name the TOML file of a {kind}")
+                           hint=nearest(source.removesuffix(".toml"), sorted(builtin)) or f"name the file of the {kind}")
     except OSError as fault:
         return None, error("file.unreadable", f"cannot read {shown(path)}: {reason(fault)}", file=file, lines=lines,
                            hint=remedy(fault, f"name a TOML file of a {kind}"))
@@ -341,7 +341,7 @@ def _added(model: type[BaseModel], path: KeyPath) -> str:
         m.model_fields[name].is_required() for m in _tables(model, path) if name in m.model_fields)]
     if needed:
         return f"add a table [{dotted(path)}] with {', '.join(f'{name} = ...' for name in needed)}"
-    where = f"to [{dotted(path[:-1])}]" if path[1:] else "at the top"
+    where = f"to {table_named(path[:-1])}" if path[1:] else "at the top"
     return f"add {path[-1]} = ... {where}"
 
 

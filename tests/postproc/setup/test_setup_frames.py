@@ -151,8 +151,7 @@ def test_skew_placement_is_refused(part: dict[str, list[float]], angle_found: st
     ("[part]\nx_axis = [0, 0, 0]", 2), ("[part]\nx_axis = [1, 0, 0]\ny_axis = [1, 1, 0]", 3),
     ("\nwork_offset_code = 'G60'", 2), ("[output.operations]\nNIX = 'axes'", 2), ("[output.smoothing]\nNIX = 'roughing'", 2),
     ("\n[control_pivots.B]\npoint = [0, 0, 0]", 2), ("[control_pivots.A]\npoint = [0, 1, 0]", 1),
-    ("[clearance]\ncentre = [0, 0, 0]\n[[places]]\nwork_offset_code = 'G54'", 2),
-    ("[[places]]\nwork_offset_code = 'G54'\n[[places]]\nname = 'b'\nwork_offset_code = 'G60'", 5)])
+    ("[[places]]\nname = 'a'\nwork_offset_code = 'G54'\n[[places]]\nname = 'b'\nwork_offset_code = 'G60'", 6)])
 def test_what_a_set_up_has_wrong_is_said_with_its_line(text: str, line: int, tmp_path: Path) -> None:
     file = tmp_path / "s.toml"
     file.write_text(text + "\n")
