@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
+import linked_pages  # noqa: E402  # of this tree
 from live_reports import write_reports  # noqa: E402  # of this tree
 from reference_pages import write_pages  # noqa: E402  # of this tree
 
@@ -32,7 +34,18 @@ html_copy_source = False
 html_show_sourcelink = False
 html_theme_options = {"navigation_with_keys": True}
 nitpicky = False
-suppress_warnings = ["myst.xref_missing"]  # links to files of the source tree, which the site does not hold
 write_pages(HERE / "reference" / "generated")
+linked_pages.write_pages()
 write_reports(HERE / "reference" / "generated" / "pages" / "reports")
 html_extra_path = ["reference/generated/pages"]  # its folder `reports` stands at the top of the site
+
+
+def setup(app: Any) -> None:
+    """Links to documents of the tree lead to their pages."""
+    app.connect("source-read", _linked)
+
+
+def _linked(app: Any, name: str, source: list[str]) -> None:
+    page = HERE / f"{name}.md"
+    if linked_pages.COPIES not in page.parents:
+        source[0] = linked_pages.linked(source[0], page)

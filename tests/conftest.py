@@ -12,6 +12,7 @@ from tests import (
     compile_once,
     cover,
     environment,
+    few_messages,
     machines_once,
     one_command,
     processor_time,
@@ -28,9 +29,10 @@ from tests.processor_time import (
     pytest_testnodedown,
 )
 from tests.said import pytest_runtest_call
+from tests.together import pytest_xdist_make_scheduler
 
 __all__ = ["environment", "lengths_looked_at_where_they_are_seen", "pytest_runtest_call", "pytest_runtest_protocol",
-           "pytest_sessionfinish", "pytest_terminal_summary", "pytest_testnodedown"]
+           "pytest_sessionfinish", "pytest_terminal_summary", "pytest_testnodedown", "pytest_xdist_make_scheduler"]
 
 # Files that are imported make no garbage worth looking for.
 gc.disable()
@@ -54,13 +56,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.linuxcnc)
 
 
-def pytest_collection_finish() -> None:
+def pytest_collection_finish(session: pytest.Session) -> None:
     """What stays until the end is not looked through by each collection of garbage, and there are fewer of them."""
     gc.freeze()
     gc.set_threshold(100_000, 50, 100)
     gc.enable()
     compile_once.install()
     one_command.install()
+    few_messages.install(session.config)
 
 
 @cache

@@ -31,8 +31,6 @@ ROOMS = frozenset({TESTS / "hints", TESTS / "linuxcnc", *(TESTS / "postproc" / r
     "setup_sheet", "time_study", "witness", "writing"))})
 SEEN = frozenset({"test_golden_programs.py", "test_next_modes.py"})
 """files of these rooms that show them"""
-CASE = "tool-table.outside"
-"""in the name of the one case of a hint that shows them"""
 UNHEARD = frozenset({TESTS / "linuxcnc", *(TESTS / "postproc" / room for room in (
     "alignment", "batch", "cli", "collision", "controllers", "correction", "cycle_time", "differences", "dossier", "joints",
     "orientation", "path", "placement", "planning", "readback", "reference", "report", "setup_sheet", "time_fit",
@@ -63,17 +61,19 @@ def _silent(*given: Any) -> tuple[Testimony, list[Any]]:
     return Testimony((), ()), []
 
 
-@pytest.fixture(autouse=True)
-def lengths_looked_at_where_they_are_seen(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """For every test; the second witness and drawings too."""
+@pytest.fixture(autouse=True, scope="module")
+def lengths_looked_at_where_they_are_seen(request: pytest.FixtureRequest) -> Iterator[None]:
+    """For every file of tests; the second witness and drawings too."""
     room, name = request.path.parent, request.path.name
-    if name not in DRAWN:
-        monkeypatch.setattr(drawing, "_settle", _as_put)
-        monkeypatch.setattr(drawing, "DOTS", ROUGH)
-    if room in ROOMS and name not in SEEN and CASE not in request.node.name:
-        monkeypatch.setattr(read_back, NAME, _none)
-    if room in UNHEARD and name not in HEARD:
-        monkeypatch.setattr(stages, WITNESS, _silent)
+    with pytest.MonkeyPatch.context() as patch:
+        if name not in DRAWN:
+            patch.setattr(drawing, "_settle", _as_put)
+            patch.setattr(drawing, "DOTS", ROUGH)
+        if room in ROOMS and name not in SEEN:
+            patch.setattr(read_back, NAME, _none)
+        if room in UNHEARD and name not in HEARD:
+            patch.setattr(stages, WITNESS, _silent)
+        yield
 
 
 @contextmanager

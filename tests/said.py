@@ -41,9 +41,12 @@ def said() -> dict[str, Said]:
 
 
 @cache
-def _told(test: str) -> dict[str, str]:
-    """What a test must be told, by code."""
-    return {code: one["text"] for code, one in said().items() if one["test"] == test}
+def _told() -> dict[str, dict[str, str]]:
+    """What tests must be told, by test and code."""
+    found: dict[str, dict[str, str]] = {}
+    for code, one in said().items():
+        found.setdefault(one["test"], {})[code] = one["text"]
+    return found
 
 
 def shown(one: Said) -> str:
@@ -135,7 +138,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
     """What the test must be told it is told; what it is told is kept where that is asked for."""
-    file, must = item.config.getoption("--said"), _told(item.nodeid)
+    file, must = item.config.getoption("--said"), _told().get(item.nodeid, {})
     if not file and not must:
         return (yield)
     with Hearing() as hearing:

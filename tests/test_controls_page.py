@@ -29,8 +29,24 @@ def test_tests_are_there() -> None:
     assert len(named) > 40 and [name for name in named if not (ROOT / "tests" / name).is_file()] == []
 
 
-def test_every_key_of_a_control_is_listed() -> None:
-    from machines.models import ControlModel
+MACHINE = {"module", "travel", "velocity", "acceleration", "jerk", "home", "assumed", "source"}
+"""keys of the machine itself: its kinematics and figures, and who states them"""
+ELSEWHERE = {"description", "assumed", "machine", "placement", "orientation"}
+"""keys of a set-up for people, and of commands that convert nothing"""
 
-    listed = set(re.findall(r"`([a-z_]+)`", "".join(row[0] for row in OPTIONS)))
-    assert set(ControlModel.model_fields) - {"module"} <= listed
+
+def test_every_key_is_listed_with_a_test_that_states_it() -> None:
+    """Those of a control, its axes, clamps and rests in the machine file, and those of a set-up."""
+    from machines.models import AxisModel, ControlModel, TimingModel
+    from postproc.setup import model as setup
+    from postproc.setup.bodies import ToolBody
+
+    listed = {key: re.findall(r"`([^`]+)`", row[2]) for row in OPTIONS[1:]
+              for key in re.findall(r"[a-z_]+", " ".join(re.findall(r"`([^`]+)`", row[0])))}
+    keys = {key for one in (ControlModel, AxisModel, TimingModel) for key in one.model_fields} - MACHINE
+    keys |= {key for one in (setup.SetupFile, setup.PartPlacement, setup.LinkClearance, setup.ToolSetup, setup.OutputSettings,
+                             setup.RewindSettings, setup.Joints, setup.PlaceSetup) for key in one.model_fields}
+    keys -= ELSEWHERE | set(ToolBody.model_fields)
+    assert keys - set(listed) == set()
+    texts = {key: "".join((ROOT / "tests" / name).read_text("utf-8") for name in names) for key, names in listed.items()}
+    assert sorted(key for key in keys if key not in texts[key]) == []

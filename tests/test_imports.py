@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.source import ROOT, nodes
+from tests.source import ROOT, nodes, written
 
 ROAD = ("toolpaths", "machines", "postproc")
 """Each package may import itself and those before it."""
@@ -130,6 +130,14 @@ def test_names_come_from_the_file_that_defines_them() -> None:
 def test_a_name_that_is_handed_through_is_noticed(tmp_path: Path) -> None:
     (tmp_path / "shim.py").write_text("from postproc.joints.tracks import TRAVEL_SLACK\nOWN = 1\n")
     assert own_names(tmp_path / "shim.py") == {"OWN"}
+
+
+def test_commands_given_by_path_find_the_tests_that_they_import() -> None:
+    """`python tests/benchmarks/x.py` looks for packages in its own folder: what imports `tests` puts the tree first."""
+    lost = [path for path in sorted((ROOT / "tests").rglob("*.py"))
+            if f"python {path.relative_to(ROOT).as_posix()}" in (text := written(path)) and "\nfrom tests" in text
+            and "sys.path.insert" not in text]
+    assert lost == []
 
 
 def test_files_and_functions_are_short() -> None:

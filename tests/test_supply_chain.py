@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 import socket
+import tomllib
+from importlib.metadata import distributions
 from pathlib import Path
 from typing import Any
 
 import pytest
+from packaging.specifiers import SpecifierSet
 
-from tests.source import product, written
+from tests.source import ROOT, product, written
 from tests.supply_chain import PAGE, licence, locked, parts, sbom
 
 IMPORTED = re.compile(r"^\s*(?:import|from) +(\w+)", re.MULTILINE)
@@ -35,6 +38,15 @@ def test_a_licence_is_found_wherever_a_package_states_it() -> None:
     assert licence(one) == "BSD License"
     one["License-Expression"] = "BSD-3-Clause"
     assert licence(one) == "BSD-3-Clause"
+
+
+def test_what_is_pinned_installs_on_the_oldest_python() -> None:
+    """Debian 12 has 3.11.2: a pinned version that asks for a later one ends `make demo` and the container there."""
+    oldest = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["requires-python"].removeprefix(">=") + ".0"
+    asked = {one.metadata["Name"]: one.metadata.get("Requires-Python") or "" for one in distributions()
+             if re.sub(r"[-_.]+", "-", one.metadata["Name"]).lower() in locked()}
+    assert len(asked) > 50
+    assert {name: text for name, text in asked.items() if not SpecifierSet(text).contains(oldest)} == {}
 
 
 def test_the_list_of_parts_is_whole() -> None:

@@ -75,7 +75,8 @@ def read_freecad(path: Path, text: str, stated: Sequence[str]) -> tuple[Draft, d
     except ValidationError as faults:
         for fault in faults.errors():
             keys = [str(key) for key in fault["loc"]]
-            draft.error("import.number", f"{'.'.join(keys)}: {fault['msg']}", _line(text, *keys), "write it as FreeCAD does")
+            draft.error("import.number", f"{'.'.join(keys) or 'the file'}: {fault['msg']}", _line(text, *keys),
+                        "write it as FreeCAD does")
         return draft, {}
     if wrong := [name for name in machine.axes if name not in "XYZUVWABC" or (name in ROTARY) != (
             machine.axes[name].type != "linear")]:
@@ -114,6 +115,9 @@ def _axis(draft: Draft, name: str, axis: FreecadAxis, scale: float, text: str) -
     if low is not None and high is not None:
         draft.put(("axes", name, "travel"), [low * unit, high * unit], _line(text, "axes", name, "limits"),
                   f"limits min {low:g}, max {high:g}")
+    elif low is not None or high is not None:
+        draft.error("import.travel", f"axis {name} has one end of its travel only", _line(text, "axes", name, "limits"),
+                    "write min and max")
     if axis.max_velocity:
         draft.put(("axes", name, "velocity"), axis.max_velocity * unit * PER_MINUTE,
                   _line(text, "axes", name, "max_velocity"), f"max_velocity {axis.max_velocity:g}")

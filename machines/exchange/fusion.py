@@ -279,6 +279,8 @@ def _axis(draft: Draft, mover: _Mover, gauge: Vector, scale: float, text: str) -
     unit, line = 1.0 if turns else scale, _line(text, "kinematics", part.id)
     if part.min is not None and part.max is not None:
         draft.put(("axes", name, "travel"), [part.min * unit, part.max * unit], line, f"min {part.min:g}, max {part.max:g}")
+    elif part.min is not None or part.max is not None:
+        draft.error("import.travel", f"part {part.id} has one end of its travel only", line, "write min and max")
     elif turns:
         draft.made(("axes", name, "travel"), "unlimited", "no min, no max")
     if part.home is not None:

@@ -120,7 +120,10 @@ def _no_mill(elements: list[_Element]) -> tuple[int, str] | None:
 def _put(draft: Draft, axis: _Axis) -> None:
     name, line, values = axis.name, axis.element.line, axis.element.values
     travel, home, rapid = axis.figures("range"), axis.figures("homePosition"), axis.figures("rapidFeed")
-    if axis.turns and (len(travel) != 2 or values.get("cyclic") == "yes"):
+    if values.get("cyclic") != "yes" and len(travel) not in (0, 2):
+        draft.error("import.travel", f"range {values['range']!r} of {name} is not two ends", line,
+                    "write range with both ends, as -120deg 120deg")
+    elif axis.turns and (len(travel) != 2 or values.get("cyclic") == "yes"):
         draft.put(("axes", name, "travel"), "unlimited", line, "cyclic" if values.get("cyclic") == "yes" else "no range")
     elif len(travel) == 2:
         draft.put(("axes", name, "travel"), [travel[0], travel[1]], line, f"range {values['range']}")

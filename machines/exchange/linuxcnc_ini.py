@@ -39,6 +39,8 @@ class _IniMachine:
         given = [word.partition("=")[2] for word in words if word.lower().startswith("coordinates=")]
         self.order = (given[0] if given else COORDINATES.get(self.module, "")).upper()
         self.hal = HalFiles(ini)
+        self.unset: dict[str, float] = {}
+        """pins that nothing sets in what was read, and what LinuxCNC has for them"""
         draft.found += ini.found
         self.scale = 1.0
 
@@ -127,6 +129,7 @@ class _IniMachine:
                     self.draft.error("import.pin", f"{' '.join(word.words)} is not read: the geometry is that of 0 there",
                                      word.line, "", word.file)
             put_geometry(self.draft, self.module, PinReader(self._pin, self.scale))
+            self._say_unset()
             return
         self.draft.made(("kinematics", "kind"), "serial", "")
         if own is not None:
@@ -137,6 +140,17 @@ class _IniMachine:
             turning = " and ".join(sorted(set(letters) & set(ROTARY)))
             self.draft.error("import.geometry", f"trivkins says which axes there are, not where the lines of {turning} "
                              "are and what they carry", self._line("KINS", "KINEMATICS")[0], _STRUCTURE_HINT)
+
+    def _say_unset(self) -> None:
+        """Of all pins at once: a HAL file that was not read is one cause."""
+        if self.unset:
+            names, files = ", ".join(self.unset), ", ".join(entry.value for entry in self.hal.unread)
+            first, values = next(iter(self.unset)), ", ".join(f"{value:g}" for value in self.unset.values())
+            some = len(self.unset) > 1
+            self.draft.warning("import.pin", f"{names} {'are' if some else 'is'} set nowhere in what was read, so "
+                               f"LinuxCNC's {values} {'count' if some else 'counts'}; {files} was not read",
+                               self.hal.unread[0].line,
+                               f"compare with halcmd getp {first}, and state what differs: --set {first}=VALUE")
 
     def _line(self, section: str, key: str) -> tuple[int, str, str]:
         entry = self.ini.first(section, key)
@@ -153,10 +167,7 @@ class _IniMachine:
             self.draft.error("import.pin", f"{pin} is driven by {' '.join(word.words)}, whose value does not stand in the "
                              "file", word.line, f"state it: --set {pin}=VALUE", word.file)
         elif word is None and self.hal.unread:
-            names = ", ".join(entry.value for entry in self.hal.unread)
-            self.draft.warning("import.pin", f"{pin} is set nowhere in what was read, so it is LinuxCNC's {default:g}; "
-                            f"{names} was not read", self.hal.unread[0].line, f"compare it with halcmd getp {pin}, and "
-                            f"state it: --set {pin}=VALUE")
+            self.unset[pin] = default
         if word is None or value is None:
             return default, 0, f"LinuxCNC's default of {pin}", ""
         return value, word.line, " ".join(word.words), word.file
@@ -211,10 +222,14 @@ class _IniMachine:
                            low[1].file)
         elif letter in ROTARY and not low and not high:
             self.draft.made(path, "unlimited", "no MIN_LIMIT, no MAX_LIMIT")
-        elif low or high:
+        elif (low or high) and not self._not_a_number(letter):
             entry = (low or high or (0.0, None))[1]
             self.draft.error("import.travel", f"axis {letter} has {entry.said if entry else ''} and no other end",
                              entry.line if entry else 0, "write MIN_LIMIT and MAX_LIMIT")
+
+    def _not_a_number(self, letter: str) -> bool:
+        """True where an end of travel is written and has been said to be no number."""
+        return any(entry.number is None for key in ("MIN_LIMIT", "MAX_LIMIT") for entry in self._entries(letter, key))
 
     def _cap(self, what: str) -> IniEntry | None:
         entry = self.ini.first("TRAJ", f"MAX_LINEAR_{what}")

@@ -19,6 +19,7 @@ from machines.exchange.draft import Draft
 from machines.exchange.siemens_data import MachineDatum, SiemensData, read_data
 from machines.kinematics.chain import ROTARY
 from toolpaths.dataclass import dataclass
+from toolpaths.diagnostics import has_errors
 from toolpaths.units import MM_PER_INCH
 
 Carried = Literal["T", "P", "M"]
@@ -69,6 +70,8 @@ class _SiemensMachine:
         metric = data.get("MN_SCALING_SYSTEM_IS_METRIC")
         self.scale = MM_PER_INCH if metric is not None and metric.number == 0.0 else 1.0
         self.machine_axes = self._machine_axes()
+        self.unread: MachineDatum | None = None
+        """a transformation of a type that is not read"""
 
     def _machine_axes(self) -> dict[str, list[str]]:
         """What the axis of a letter is called in $MA_ data: AX1, or the machine axis name."""
@@ -95,11 +98,10 @@ class _SiemensMachine:
             self._put(geometry)
         elif "kinematics.structure" in self.draft.stated:
             pass
-        elif turning and any(d.code == "import.geometry" for d in self.draft.found):
-            pass  # what is wrong with the transformation has been said
+        elif turning and has_errors(self.draft.found):
+            pass  # what is wrong has been said
         elif turning:
-            self.draft.error("import.geometry", "neither a transformation that is read nor a swivel data record "
-                             f"says where {' and '.join(turning)} {'are' if turning[1:] else 'is'}", hint=_HINT)
+            self._nowhere(turning)
         else:
             self.draft.made(("kinematics", "structure"), "w b X Y Z (C1) t", "")
         letters = [*"XYZ", *sorted(turning)]
@@ -107,13 +109,27 @@ class _SiemensMachine:
             self._axis(letter)
         return self.draft, {letter: letter in ROTARY for letter in letters}
 
+    def _nowhere(self, turning: list[str]) -> None:
+        """Nothing that is read says where the rotary axes are: one cause, by what the file has in its place."""
+        chain = next((one for (name, _), one in self.data.data.items() if name.startswith(("NK_", "NT_"))), None)
+        if self.unread is not None:
+            self.draft.error("import.kinematics", f"{self.unread.said}: of the 5-axis transformations types 24, 40, 56, 16 "
+                             "to 21 and 32 to 35 are read; of 48 to 51 no document at hand says which vector goes to the "
+                             "table", self.unread.line, _HINT)
+        elif chain is not None:
+            self.draft.error("import.kinematics", f"{chain.said}: kinematic chains ($NK_..., $NT_...) are not read",
+                             chain.line, _HINT)
+        else:
+            self.draft.error("import.geometry", "neither a transformation that is read nor a swivel data record "
+                             f"says where {' and '.join(turning)} {'are' if turning[1:] else 'is'}", hint=_HINT)
+
     def _turning(self) -> list[str]:
         """Axes that are called like rotary ones, and are not said to be linear."""
         stated = {letter: self._ma("MA_IS_ROT_AX", letter) for letter in self.machine_axes if letter in ROTARY}
         return sorted(letter for letter, datum in stated.items() if datum is None or datum.number != 0.0)
 
     def _ma(self, name: str, letter: str, before: str = "") -> MachineDatum | None:
-        for axis in [*self.machine_axes.get(letter, []), letter, f"{letter}1"]:
+        for axis in [*(one.upper() for one in self.machine_axes.get(letter, [])), letter, f"{letter}1"]:
             if found := self.data.get(name, f"{before}{axis}") or (self.data.get(name, axis) if before else None):
                 return found
         return None
@@ -139,9 +155,7 @@ class _SiemensMachine:
             if kind in _OLDER:
                 return self._of_older_type(datum, *_OLDER[kind], n)
             if 16 <= kind <= 51:
-                self.draft.warning("import.kinematics", f"{datum.said}: of the 5-axis transformations types 24, 40, 56, 16 "
-                                   "to 21 and 32 to 35 are read; of 48 to 51 no document at hand says which vector goes to "
-                                   "the table", datum.line, _HINT)
+                self.unread = datum
         return None
 
     def _types(self) -> list[MachineDatum]:
@@ -151,10 +165,12 @@ class _SiemensMachine:
         base, joint = self._vector(f"MC_TRAFO5_BASE_TOOL_{n}"), self._joint(carried, n)
         vectors = (self.data.vector(f"MC_TRAFO5_AXIS1_{n}")[0], self.data.vector(f"MC_TRAFO5_AXIS2_{n}")[0])
         if not any(vectors[0]) or not self._plain(n):
-            if not any(vectors[0]):
+            if not any(vectors[0]) and not has_errors(self.draft.found):
                 self.draft.error("import.geometry", f"{datum.said}, and no $MC_TRAFO5_AXIS1_{n}", datum.line, _HINT)
             return None
         self._closes(carried, base, joint, n)
+        self._say_absent(datum, [f"MC_TRAFO5_AXIS1_{n}", f"MC_TRAFO5_AXIS2_{n}" if any(vectors[1]) else ""])
+        self._say_absent(datum, self._lines(carried, n))
         letters = self._letters(self._entering(n), vectors)
         return SwivelGeometry(carried, vectors, _points(carried, base, joint), letters, datum)
 
@@ -183,6 +199,7 @@ class _SiemensMachine:
             return None
         base, joint = self._vector(f"MC_TRAFO5_BASE_TOOL_{n}"), self._joint(carried, n)
         self._closes(carried, base, joint, n)
+        self._say_absent(datum, self._lines(carried, n))
         points = _points(carried, base, joint)
         sense = -1.0 if carried == "P" else 1.0
         first, second = ([sense * float(letter == axis) for axis in "ABC"] for letter in letters)
@@ -214,6 +231,28 @@ class _SiemensMachine:
                              "for a table, enter one of them")
         return self._vector(part)
 
+    def _lines(self, carried: Carried, n: str) -> list[str]:
+        """Names of the vectors that `_points` takes."""
+        part = f"MC_TRAFO5_JOINT_OFFSET_PART_{n}"
+        of_part = carried == "M" or (carried == "P" and self.data.vector(part)[1] is not None)
+        return [f"MC_TRAFO5_BASE_TOOL_{n}", part if of_part else f"MC_TRAFO5_JOINT_OFFSET_{n}"]
+
+    def _say_absent(self, datum: MachineDatum, names: Sequence[str], index: str = "") -> None:
+        """Elements of vectors that no line states: 0 on the control, unless the file is cut off.
+
+        Args:
+            datum: what the vectors belong to
+            names: of vectors [0] to [2]; with `index` of their elements, which all have it
+        """
+        places = [(name, index) for name in names] if index else [(name, k) for name in names if name for k in "012"]
+        missing = [f"${name}[{k}]" for name, k in places if self.data.get(name, k) is None]
+        if missing and len(missing) == len([name for name in names if name]) * (1 if index else 3):
+            self.draft.error("import.geometry", f"{datum.said}, and no line states where its axes are: {', '.join(missing)}",
+                             datum.line, _HINT)
+        elif missing:
+            self.draft.warning("import.default", f"no line states {', '.join(missing)}: the control's default, 0, counts",
+                               datum.line, "compare with the control, and write the lines that are not 0 there")
+
     def _vector(self, name: str) -> list[float]:
         return [value * self.scale for value in self.data.vector(name)[0]]
 
@@ -229,6 +268,9 @@ class _SiemensMachine:
                 return None
             self._fine(n)
             known: Carried = "T" if carried == "T" else "P" if carried == "P" else "M"
+            two = any(vectors[1])
+            self._say_absent(datum, [f"TC_CARR{k}" for k in range(7, 13 if two else 10)], n)
+            self._say_absent(datum, [f"TC_CARR{k}" for k in (4, 5, 6, *((15, 16, 17) if two else ()))], n)
             mm = [[value * self.scale for value in self._carr(n, k)] for k in (4, 15)]
             points = _points(known, *((mm[1], mm[0]) if known == "T" else (mm[0], mm[1])))
             named = [self.data.get(f"TC_CARR{k}", n) for k in (35, 36)]
@@ -269,9 +311,7 @@ class _SiemensMachine:
         turns = letter in ROTARY
         for key, (name, before, linear, rotary) in _FIGURES.items():
             found = self._ma(name, letter, before)
-            if found is not None and found.number is None:
-                self.draft.error("import.number", f"{found.said} is not a number", found.line, "write a number")
-            elif found is not None and found.number is not None:
+            if found is not None and found.number is not None:
                 self.draft.put(("axes", letter, key), found.number * (rotary if turns else linear * self.scale), found.line,
                                found.said)
         self._travel(letter, 1.0 if turns else self.scale)
@@ -288,7 +328,7 @@ class _SiemensMachine:
             self.draft.put(path, [end * scale for end in ends], low.line, f"{low.said}, {high.said}")
         elif letter in ROTARY and not ends and (datum := low or high):
             self.draft.put(path, "unlimited", datum.line, datum.said)
-        elif ends and (datum := low or high):
+        elif ends and all(one is None or one.number is not None for one in (low, high)) and (datum := low or high):
             self.draft.error("import.travel", f"axis {letter} has {datum.said} and no other end", datum.line,
                              "write $MA_POS_LIMIT_MINUS and $MA_POS_LIMIT_PLUS")
 

@@ -11,9 +11,16 @@ from dataclasses import field
 from machines.exchange.draft import Draft
 from toolpaths.dataclass import dataclass
 
-_ASSIGNMENT = re.compile(r"(?:N\d+\s+)?\$(?P<name>(?:M[ANC]|TC|S[CNA])_\w+)\s*(?:\[(?P<index>[^\]]*)\])?\s*"
-                         r"=\s*(?P<value>[^;]*)")
-_CHANNEL = re.compile(r"CHANDATA\s*\(\s*(\d+)\s*\)")
+_ASSIGNMENT = re.compile(r"(?:N\d+\s+)?\$(?P<name>(?:M[ANC]|TC|S[CNA]|N[KT])_\w+)\s*(?:\[(?P<index>[^\]]*)\])?\s*"
+                         r"=\s*(?P<value>[^;]*)", re.IGNORECASE)
+_CHANNEL = re.compile(r"CHANDATA\s*\(\s*(\d+)\s*\)", re.IGNORECASE)
+_NEXT = re.compile(r"(=[^;$]*?)\s+(?=\$)")
+"""the end of one assignment before another in its line"""
+_NUMBERS = re.compile(r"MC_TRAFO_TYPE_\d+|MC_TRAFO_AXES_IN_\d+|MC_TRAFO5_\w+|MC_AXCONF_MACHAX_USED|"
+                      r"MN_SCALING_SYSTEM_IS_METRIC|MA_(?:POS_LIMIT|MAX_AX|ROT_IS_MODULO|IS_ROT_AX)\w*|"
+                      r"TC_CARR(?!23$|3[456]$)\d+")
+"""names that are read as numbers"""
+_LOGICAL = {"TRUE": 1.0, "FALSE": 0.0}
 
 
 @dataclass(frozen=True)
@@ -32,9 +39,11 @@ class MachineDatum:
 
     @property
     def number(self) -> float | None:
-        """The value, None where it is no number."""
+        """The value, None where it is no number; TRUE is 1, FALSE 0."""
+        if self.value.upper() in _LOGICAL:
+            return _LOGICAL[self.value.upper()]
         try:
-            return float(self.value.strip("'\"").replace("EX", "E"))
+            return float(self.value.strip("'\"").upper().replace("EX", "E"))
         except ValueError:
             return None
 
@@ -71,25 +80,29 @@ class SiemensData:
 
 
 def read_data(draft: Draft, text: str) -> SiemensData:
-    """The assignments; what begins like one and is none, and what is assigned twice, is said."""
+    """The assignments; what begins like one and is none, what is assigned twice, and what is no number, is said."""
     result, channel = SiemensData(), 1
     for line, raw in enumerate(text.splitlines(), 1):
         statement = raw.strip()
         if named := _CHANNEL.search(statement):
             channel = int(named[1])
-        found = _ASSIGNMENT.match(statement)
-        if found is None:
-            if statement.startswith("$") or "$M" in statement.split(";")[0]:
-                draft.warning("import.line", f"not understood: {statement[:60]}", line,
-                           "write $NAME[index] = value on one line")
-            continue
-        of_channel = found["name"].startswith(("MC_", "SC_", "TC_"))
-        if of_channel and channel != 1:
-            continue
-        datum = MachineDatum(found["name"], "".join((found["index"] or "").split()), found["value"].strip(), line)
-        before = result.get(datum.name, datum.index)
-        if before is not None and before.value != datum.value:
-            draft.warning("import.contradiction", f"{before.said} in line {before.line} and {datum.value}: the last one "
-                          "counts", line, "take out the line that is not meant")
-        result.data[datum.name, datum.index] = datum
+        for part in _NEXT.sub("\\1\n", statement).split("\n"):
+            if found := _ASSIGNMENT.match(part):
+                _add(draft, result, MachineDatum(found["name"].upper(), "".join((found["index"] or "").split()).upper(),
+                                                 found["value"].strip(), line), channel)
+            elif part.startswith("$") or "$M" in part.split(";")[0]:
+                draft.warning("import.line", f"not understood: {part[:60]}", line, "write $NAME[index] = value on one line")
     return result
+
+
+def _add(draft: Draft, result: SiemensData, datum: MachineDatum, channel: int) -> None:
+    """One assignment more, where it is of the first channel."""
+    if channel != 1 and datum.name.startswith(("MC_", "SC_", "TC_")):
+        return
+    before = result.get(datum.name, datum.index)
+    if before is not None and before.value != datum.value:
+        draft.warning("import.contradiction", f"{before.said} in line {before.line} and {datum.value}: the last one "
+                      "counts", datum.line, "take out the line that is not meant")
+    if datum.number is None and _NUMBERS.fullmatch(datum.name):
+        draft.error("import.number", f"{datum.said} is not a number", datum.line, "write a number")
+    result.data[datum.name, datum.index] = datum

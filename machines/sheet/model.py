@@ -51,8 +51,8 @@ class PivotSheet(UserModel):
 
     form: PivotForm
     """whose names: haas (MRZP, settings 255 to 257 and 300 to 305), siemens (I1 to I4 of the swivel data set, what CYCLE996
-    measures), heidenhain (rows Trans of the kinematics, what cycle 451 measures), fanuc (19700 to 19714, by hand or G10
-    L52), machine (points of the lines themselves)"""
+    measures), heidenhain (rows Trans of the kinematics from the tool on, what cycle 451 measures), fanuc (19700 to 19714,
+    by hand or G10 L52), machine (points of the lines themselves)"""
     points: dict[str, Vector] = Field(default_factory=dict)
     """by the control's name: "MRZP", "I2", "Trans 1", "19700"; with form "machine" by letter of the axis"""
     text: str = ""

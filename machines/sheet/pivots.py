@@ -24,8 +24,10 @@ _TWO_TABLES: dict[PivotForm, VectorNames] = {
 _TWO_HEADS: dict[PivotForm, VectorNames] = {
     "siemens": ("I3", "I2", "(I1)"), "heidenhain": ("Trans 1", "Trans 2"), "fanuc": ("19709", "19712")}
 _MIXED: dict[PivotForm, tuple[VectorNames, VectorNames]] = {
-    "siemens": (("I3", "(I4)"), ("I2", "(I1)")), "heidenhain": (("Trans 1",), ("Trans 2",)),
+    "siemens": (("I3", "(I4)"), ("I2", "(I1)")), "heidenhain": (("Trans 2",), ("Trans 1",)),
     "fanuc": (("19700",), ("19709",))}
+_FROM_TOOL = ("heidenhain",)
+"""forms whose vectors are one sequence from the tool to the part: that of the table begins at the axis of the head"""
 
 
 def names_of(form: PivotForm, table: tuple[str, ...], head: tuple[str, ...]) -> tuple[VectorNames, VectorNames]:
@@ -70,9 +72,10 @@ def points_of(form: PivotForm, table: tuple[str, ...], head: tuple[str, ...],
         lacks = f"{', '.join(missing)} missing: X, Y and Z in mm"
         return {}, [f"{'; '.join(wrong)}; {lacks}" if wrong else lacks]
     points = dict[str, Floats]()
-    for chain, letters in zip(chains, (table, head[::-1]), strict=True):
+    at = np.zeros(3)
+    for chain, letters in zip(chains[::-1], (head[::-1], table), strict=True):
         vectors = {name.strip("()"): np.array(given.get(name.strip("()"), (0.0, 0.0, 0.0))) for name in chain}
-        at = np.zeros(3)
+        at = at if form in _FROM_TOOL else np.zeros(3)
         for letter, name in zip(letters, chain, strict=False):
             at = at if name not in given else vectors[name] if form in _PLACES else at + vectors[name]
             points[letter] = at

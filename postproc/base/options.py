@@ -56,6 +56,8 @@ class Options:
     """output modes, ends of blocks, shares of the tolerance and feed mode chosen for the least time on the control"""
     off_path: bool = False
     """blocks of cuts may end off the path, within the tolerance, where fewer of them do"""
+    filled: bool = False
+    """points between may use up what the tolerance leaves for them; default: a part of it stays free"""
     smoothing: float = 0.0
     """mm of the tolerance that the control's own smoothing may take, where its blocks state it; 0: as the controller file"""
 
@@ -98,6 +100,8 @@ class Options:
             lines.append("optimised for the time on the control")
         if self.off_path:
             lines.append("block ends off the path")
+        if self.filled:
+            lines.append("tolerance used up")
         if self.smoothing:
             lines.append(smoothing_line(self.smoothing, said))
         if self.error_model:

@@ -101,23 +101,30 @@ class OptimisedStep:
 
 @dataclass(frozen=True)
 class Optimised:
-    """What `--optimise` came to: choices taken in order, time without it and with it, number of choices tried."""
+    """What `--optimise` came to: choices taken in order, time without it and with it, number of choices tried; s that no sharing
+    of the tolerance beats (a control and the program's points with all of it each), 0 where that is not known."""
 
     steps: tuple[OptimisedStep, ...]
     before: ProgramTime
     after: ProgramTime
     tried: int
+    least: float = 0.0
+
+    @property
+    def bound(self) -> float:
+        """s below which no choice here comes: the program's lower bound, or what no sharing of the tolerance beats."""
+        return max(self.before.bound, self.least)
 
     @property
     def closed(self) -> float | None:
-        """Percent of the time above the bound of the program without it that is saved; None where it is at the bound."""
-        gap = self.before.seconds - self.before.bound
+        """Percent of the time above the bound that is saved; None where it is at the bound."""
+        gap = self.before.seconds - self.bound
         return 100.0 * (self.before.seconds - self.after.seconds) / gap if gap > 0.0 else None
 
     def as_dict(self) -> dict[str, object]:
         """As JSON."""
         return {"before_s": self.before.seconds, "after_s": self.after.seconds, "lower_bound_s": self.before.bound,
-                "closed_percent": self.closed, "model": self.after.model, "tried": self.tried,
+                "least_s": self.least, "closed_percent": self.closed, "model": self.after.model, "tried": self.tried,
                 "steps": [{"choice": one.what, "before_s": one.before, "after_s": one.after} for one in self.steps]}
 
     def lines(self) -> list[str]:
@@ -126,5 +133,7 @@ class Optimised:
             return [f"optimised: none of {self.tried} other choices is faster on this control ({self.after.model})"]
         gained = "; ".join(f"{one.what} {one.before - one.after:.2f} s" for one in self.steps)
         part = "" if self.closed is None else f", {self.closed:.0f} % of what lay above its lower bound"
+        if self.least > self.before.bound:
+            part += f" ({self.least:.2f} s: its points and the control each with the whole tolerance)"
         return [f"optimised on this control ({self.after.model}): {self.before.seconds:.2f} s to {self.after.seconds:.2f} s"
                 f"{part}; gained by {gained}; {self.tried} choices tried"]

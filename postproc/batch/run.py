@@ -23,6 +23,8 @@ _USAGE = ("Usage: ", "Try 'postproc")
 """lines that stand before what is wrong with a command line"""
 TRIES = 2
 """how often a task is given to another worker where its worker ended"""
+FIRST_WORKER = 30.0
+"""seconds in which the first worker of a cluster that has just been started may come"""
 
 
 @dataclass(frozen=True)
@@ -137,6 +139,8 @@ def client_of(where: Where, stack: ExitStack) -> Any:
     if where.scheduler:
         try:
             client = stack.enter_context(library.Client(where.scheduler, timeout="5s"))
+            with suppress(TimeoutError):
+                client.wait_for_workers(1, timeout=FIRST_WORKER)
         except (OSError, ValueError, TimeoutError) as fault:
             raise DiagnosticError([error("batch.scheduler", f"no scheduler answers at {where.scheduler}: "
                                          f"{str(fault).splitlines()[0] if str(fault) else type(fault).__name__}",

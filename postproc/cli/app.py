@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
+import threading
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
@@ -317,17 +318,22 @@ def inspect(file: ClFile, units: UnitsOption = "", dialect: DialectOption = "", 
     report(tuple(result.diagnostics), json, found, text_of(result) if result.lines else "")
 
 
+_CALLED = threading.Lock()
+"""held by the command that runs: streams, words and how much is said are the process's, and a worker may have threads"""
+
+
 def run_command(arguments: Sequence[str]) -> Ran:
-    """A command line called within a process that goes on, under the guard: what a worker of a batch does."""
+    """A command line called within a process that goes on, under the guard: what a worker of a batch does, one at a time."""
     from postproc.batch.run import Ran
 
-    said, own = io.StringIO(), sys.argv
-    sys.argv = ["postproc", *arguments]
-    try:
-        with redirect_stderr(said), redirect_stdout(io.StringIO()):
-            code = guarded(lambda: only_called(app, arguments)(list(arguments), prog_name="postproc"))
-    finally:
-        sys.argv = own
+    said = io.StringIO()
+    with _CALLED:
+        own, sys.argv = sys.argv, ["postproc", *arguments]
+        try:
+            with redirect_stderr(said), redirect_stdout(io.StringIO()):
+                code = guarded(lambda: only_called(app, arguments)(list(arguments), prog_name="postproc"))
+        finally:
+            sys.argv = own
     return Ran(code, tuple(line for line in said.getvalue().splitlines() if line.strip()))
 
 

@@ -13,8 +13,8 @@ from postproc.cli.shared.options import word_option
 
 IMPORTED = "Example: postproc machine import shop.ini -o shop.toml --set kinematics.axes.A.point=[0,0,55.5]"
 EXPORTED = "Example: postproc machine export mikron-ucp710 --format linuxcnc-ini -o simulator"
-Foreign = Annotated[Path, typer.Argument(metavar="FILE", help="LinuxCNC's INI, with the HAL files that it names; Siemens "
-                                           "machine data as text; FreeCAD's .fcm")]
+Foreign = Annotated[Path, typer.Argument(metavar="FILE", help="LinuxCNC's INI, with the HAL files that it names; machine data "
+                                           "of Siemens, Heidenhain's kinematics; machine files of FreeCAD, Fusion")]
 FormOption = Annotated[GivenForm, word_option("--format", GivenForm, "what FILE is; auto: by its text")]
 SetOption = Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="what the file does not say: a key "
                                                      "of the machine file (axes.A.velocity=40) or a HAL pin")]

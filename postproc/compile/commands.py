@@ -80,7 +80,8 @@ class _Writing:
         for event in toolpath.events if restart else ():
             self.at_row.setdefault(event.index, []).append(event)
         self.to_come = [c.number for c in self.changes.values()]
-        self.selects = controller.tools.preload and not any(e.word == "SELECT" for e in toolpath.events)
+        self.selects = controller.tools.preload and not any(e.word == "SELECT" and numbers(e)[:1] != [0.0]
+                                                                for e in toolpath.events)
         self.loaded: ToolChange | None = None
         self.spindle, self.state = Spindle(), SpindleCoolantState()
         self.compensation = RadiusCompensation(moves, path, self.result, controller,
@@ -158,6 +159,8 @@ class _Writing:
             self.compensation.begin(event, move)
         elif event.word == "LOADTL":
             self._tool(at, event, out, move < len(self.moves))
+        elif event.word == "SELECT" and self._selects_nothing(event):
+            return
         elif command := _simple(event, self.spindle):
             out.append(command)
             if event.word in _STOPS:
@@ -182,6 +185,10 @@ class _Writing:
         if cut == len(self.cuts) or self.renewed[np.searchsorted(self.renewed, event.index, side="right")] <= self.cuts[cut]:
             return []
         return self.state.again(event.line, but)
+
+    def _selects_nothing(self, event: Event) -> bool:
+        """True for SELECT/TOOL,0 before a change to a tool: an empty place made ready calls for no tool on the way there."""
+        return numbers(event)[:1] == [0.0] and self.to_come[:1] != [0]
 
     def _loads(self, at: int, event: Event) -> bool:
         """True where a tool change follows at the same place."""

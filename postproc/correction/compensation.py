@@ -42,6 +42,8 @@ SHARE = 0.1
 MOVED = 2
 """how often points are put between ends: words may take ends farther by other approach directions, and blocks
 begin by those then"""
+ROOM = 1.1
+"""by how much wider a tolerance of the axis is advised than what is left of it: rounding and points between take some"""
 SETTLED = 5
 """how often the approach directions of the axes are looked for: a correction by new approach directions may
 turn other axes back"""
@@ -130,6 +132,10 @@ def compensate(path: JointPath, moves: Moves, tools: Ints, kinematics: Callable[
     lost = live & ~np.isfinite(found.q).all(axis=1)
     if has_errors(diagnostics) or lost.any():
         return None, None, diagnostics or [_lost(path, moves, lost, file)]
+    tilted = np.where(live & np.isfinite(path.u), found.after[:, 1], 0.0)
+    if (tilted > axis_tolerance).any():
+        return None, None, [*diagnostics, _tilted(path, moves, tilted, float(found.before[:, 0][tilted > 0.0].max()),
+                                                  axis_tolerance, file)]
     whole, written, resolved, axis_left = _written_out(corrected, path, work, writing, allowed)
     corrected, apart = written, work.whole[whole.owner] < 0
     whole = replace(whole, path=corrected).of(cut)
@@ -306,6 +312,18 @@ def _unmeasured(path: JointPath, moves: Moves, control: Control, where: Bools, r
         noted.append(error("compensation.range", text, file=file, lines=lines, count=len(rows),
                            hint=f"{turn}measure farther, move the part, or take --error-model-beyond"))
     return noted
+
+
+def _tilted(path: JointPath, moves: Moves, tilted: Floats, tip: float, allowed: float, file: str) -> Diagnostic:
+    """The error of an axis (K,) rad off at block ends that no joint turns back; `tip`: mm that the correction takes up."""
+    off, worst = np.flatnonzero(tilted > allowed), float(tilted.max()) / DEG
+    lines = np.unique(moves.line[path.move[off]])
+    grain = 10.0 ** (np.floor(np.log10(worst)) - 1.0)
+    enough = np.ceil(ROOM * worst / grain) * grain
+    return error("compensation.axis", f"the errors turn the tool axis by {worst:.4f} degrees that no axis of this machine "
+                 f"turns back, allowed {allowed / DEG:g} degrees; the tip, {1e3 * tip:.1f} um off, is corrected", file=file,
+                 lines=lines[:6].tolist(), count=len(off), hint=f"--axis-tolerance {enough:.10g} where the part allows it, "
+                 "or correct the machine itself")
 
 
 def _lost(path: JointPath, moves: Moves, lost: Bools, file: str) -> Diagnostic:

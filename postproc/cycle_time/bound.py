@@ -15,9 +15,13 @@ from postproc.cycle_time.linuxcnc_kernels import speeds
 from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, merge
 from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.phases import ramps
+from postproc.cycle_time.rest_ramps import rest_ramps
 from postproc.cycle_time.shape import Shape, axis_limit, shape
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Bools, Floats
 from toolpaths.compiled import chosen
+
+EXECUTED = ("control", "formulas")
+"""kinds of models whose control limits jerk, rests by its own rules, and waits at each rest"""
 
 
 def lower_bound(blocks: MotionBlocks, model: CycleTimeModel) -> float:
@@ -31,15 +35,36 @@ def lower_bound(blocks: MotionBlocks, model: CycleTimeModel) -> float:
         velocity, rate = (np.where(both, np.linalg.norm(limit[axes.xyz]), value)
                           for limit, value in ((axes.velocity, velocity), (axes.acceleration, rate)))
     target = np.minimum(np.where(merged.rapid, np.inf, merged.speed * max(model.override, 1.0)), velocity)
-    through = ~merged.forced
+    rests = must_rest(merged, form, model)
+    through = ~rests
     free = np.full(len(merged), np.inf)
     loop = chosen(speeds, len(merged), KERNEL_FROM)
     lent = shared_feed(merged, form, target, model)
     first, last = loop(length, lent, lent, rate, through, free, free)
     seconds = np.maximum(ramps(length, first, last, lent, rate).seconds,
                          at_feed(merged, form, length, target, lent, model))
-    seconds = seconds - early(merged, form, model)
-    return float(np.maximum(seconds, 0.0).sum() + blocks.pauses.seconds.sum())
+    seconds = np.maximum(seconds - early(merged, form, model), 0.0)
+    return float(seconds.sum() + _at_rests(merged, form, model, seconds, lent, rests) + blocks.pauses.seconds.sum())
+
+
+def must_rest(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> Bools:
+    """(E,) at whose end the axes rest: by command, and by the rules of the control that is modelled."""
+    if model.kind in EXECUTED and len(blocks):
+        from postproc.cycle_time.control import rests  # SciPy, which other models do without
+
+        return rests(blocks, form)
+    return blocks.forced
+
+
+def _at_rests(blocks: MotionBlocks, form: Shape, model: CycleTimeModel, seconds: Floats, lent: Floats,
+              rests: Bools) -> float:
+    """s that rests take beyond the second order: ramps of limited jerk, and what the control waits at each."""
+    if model.kind not in EXECUTED or not len(blocks):
+        return 0.0
+    wait = float(rests.sum()) * (model.stop_time + model.smoothing)
+    reach, cosine = reaches(blocks, form, model)
+    taken = np.where(cosine < 1.0 - 1e-12, reach, 0.0)
+    return wait + (rest_ramps(blocks, form, model, seconds, lent, rests, taken) if model.jerk else 0.0)
 
 
 def shared_feed(blocks: MotionBlocks, form: Shape, target: Floats, model: CycleTimeModel) -> Floats:

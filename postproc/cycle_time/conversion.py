@@ -33,6 +33,8 @@ half a second of processor time, which a small program is converted in"""
 STUDENT, LEAST_OFF = 1.4, 0.03
 """times the deviation of the mean of STRETCHES (Student's 95 % over the normal's), and its least share: what stretches
 that begin and end at rest do not show"""
+RANKED = 1000
+"""blocks up to which the control is executed for each of the programs that a choice is made of"""
 TURNING = KINDS.index("turning axes")
 
 
@@ -63,6 +65,24 @@ class ControlClock:
         """With its band, the control executed where the model says how."""
         return self._time(result, _model(result, self.model), band=True)
 
+    def ranked(self, result: PostResult) -> ProgramTime:
+        """Without a band, for dozens of programs: the control executed, of long programs over some stretches (`sampled`)."""
+        planner = _model(result, self.model)
+        blocks = from_conversion(result)
+        if len(blocks) <= RANKED:
+            return self._time(result, planner, False, blocks)
+        return self._time(result, planner.quick(), False, blocks, sampled(blocks, planner.of_machine(result.machine)).times)
+
+    def least(self, result: PostResult) -> float:
+        """Where the control had the whole tolerance for itself, whatever the program's points use of it, s: no way of sharing it
+        is faster. 0 where more tolerance need not make a control faster."""
+        planner = _model(result, self.model)
+        if planner.kind != "linuxcnc":
+            return 0.0
+        blocks = from_conversion(result)
+        whole = np.where(np.isfinite(blocks.tolerance), np.maximum(blocks.tolerance, result.options.tolerance), blocks.tolerance)
+        return self._time(result, planner, False, replace(blocks, tolerance=whole)).seconds
+
     def plan(self, made: PostResult) -> ControlPlan | None:
         """What the control can do of planned passes; None where that is not known."""
         if made.compensation is not None:
@@ -74,12 +94,13 @@ class ControlClock:
         except (ValueError, ArithmeticError):
             return None
 
-    def _time(self, result: PostResult, planner: CycleTimeModel, band: bool) -> ProgramTime:
-        blocks = from_conversion(result)
+    def _time(self, result: PostResult, planner: CycleTimeModel, band: bool, blocks: MotionBlocks | None = None,
+              times: BlockTimes | None = None) -> ProgramTime:
+        blocks = from_conversion(result) if blocks is None else blocks
         rows = len(result.comparison.moves) if result.comparison is not None else 0
         if not len(blocks) or blocks.move is None:
             return ProgramTime(0.0, (0.0, 0.0), 0.0, planner.kind, np.zeros(rows))
-        found = estimate(blocks, result.machine, planner, with_band=band and len(blocks) <= BAND_UP_TO)
+        found = estimate(blocks, result.machine, planner, with_band=band and len(blocks) <= BAND_UP_TO, times=times)
         known = blocks.move >= 0
         moves = summed(found.timed.seconds[known], blocks.move[known], rows)
         return ProgramTime(found.seconds, found.band, found.lower_bound, f"model {planner.kind}", moves)

@@ -157,13 +157,13 @@ class Eased:
         return np.clip(s, self.first, np.nextafter(self.last, self.first))
 
     def chained(self, sigma: Floats, s: Floats, inner: Derivatives) -> Derivatives:
-        """Derivatives by sigma from those by s; s (4, N) as of `parameter`."""
+        """Derivatives by sigma from those by s; s (4, N) as of `parameter`. In the place of `inner` where that may be changed."""
         bent = np.flatnonzero((sigma < self.ease) | (sigma > self.end - self.ease))
         if not len(bent):
             return inner
         s1, s2, s3 = s[1:, bent, None]
         q1, q2, q3 = inner.dq[bent], inner.d2q[bent], inner.d3q[bent]
-        outer = Derivatives(inner.q, *(np.array(order) for order in inner[1:]))
+        outer = Derivatives(inner.q, *(order if order.flags.writeable else np.array(order) for order in inner[1:]))
         outer.dq[bent] = q1 * s1
         outer.d2q[bent] = q2 * s1**2 + q1 * s2
         outer.d3q[bent] = q3 * s1**3 + 3.0 * q2 * s1 * s2 + q1 * s3

@@ -71,4 +71,4 @@ def halved(grid: MotionKnots) -> MotionKnots:
 def seconds(grid: MotionKnots, report: SolvedWindows) -> float:
     """Time of a solve, as its objective has it."""
     problem = grid.problem()
-    return float(np.sum(problem.weight * problem.basis.values(report.c)[0] ** -0.5))
+    return float(np.sum(problem.weight * problem.basis.squared(report.c) ** -0.5))

@@ -56,6 +56,11 @@ class Basis:
     def knots(self) -> int:
         return int(self.stencil.shape[2])
 
+    def squared(self, c: Floats) -> Floats:
+        """x (K,) alone."""
+        s = self.stencil[0]
+        return np.asarray(s[0] * c[:-2] + s[1] * c[1:-1] + s[2] * c[2:])
+
     def values(self, c: Floats) -> Floats:
         """x, x', x'' (3, K) at the knots from coefficients c (K + 2,)."""
         s = self.stencil

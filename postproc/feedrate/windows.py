@@ -145,7 +145,7 @@ def solve_problem(problem: SpeedProblem, make: Callable[[SpeedProblem, Floats], 
                   near: Floats | None = None) -> InteriorSolution:
     """One problem from its slow start, or from coefficients `near` slowed until they respect its limits."""
     start = problem.start() if near is None else problem.slowed(near)
-    seconds = float(np.sum(problem.weight * problem.basis.values(start)[0] ** -0.5))
+    seconds = float(np.sum(problem.weight * problem.basis.squared(start) ** -0.5))
     return solve(make(problem, start), problem.rows, (COLD if near is None else WARM) * seconds)
 
 

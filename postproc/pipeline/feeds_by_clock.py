@@ -32,6 +32,12 @@ class PlanningClock(ProgramClock, Protocol):
     def executed(self, result: PostResult) -> ProgramTime:
         """The time with its band as the control executes the program, cycle by cycle where its model says how."""
 
+    def ranked(self, result: PostResult) -> ProgramTime:
+        """The time without its band, near the executed control's: for a choice among dozens of programs."""
+
+    def least(self, result: PostResult) -> float:
+        """s where the control had the whole tolerance for itself; 0 where that is no bound."""
+
 
 StagedWhole = Callable[[PostResult], PostResult]
 """A conversion through all stages"""
@@ -40,6 +46,11 @@ StagedWhole = Callable[[PostResult], PostResult]
 def measured(clock: ProgramClock, made: PostResult) -> ProgramTime:
     """The time of a program with its band, by the executed control where its model says how: what is last decided by."""
     return clock.executed(made) if isinstance(clock, PlanningClock) else clock(made, band=True)
+
+
+def ranked(clock: ProgramClock, made: PostResult) -> ProgramTime:
+    """The time of a program among dozens, near the executed control's where the clock has one."""
+    return clock.ranked(made) if isinstance(clock, PlanningClock) else clock(made)
 
 
 def with_compared_feeds(start: PostResult, stages: StagedWhole, clock: ProgramClock | None) -> PostResult:

@@ -77,8 +77,8 @@ def common(options: Options) -> Options:
     """The options by which tool axes are chosen and proved."""
     plain = Options()
     return replace(options, feed_mode=plain.feed_mode, output=plain.output, feed=plain.feed, merge_feeds=plain.merge_feeds,
-                   optimise=plain.optimise, off_path=plain.off_path, smoothing=plain.smoothing, smooth=plain.smooth,
-                   error_model=plain.error_model, error_beyond=plain.error_beyond)
+                   optimise=plain.optimise, off_path=plain.off_path, filled=plain.filled, smoothing=plain.smoothing,
+                   smooth=plain.smooth, error_model=plain.error_model, error_beyond=plain.error_beyond)
 
 
 def written(start: PostResult, program: PostResult | None) -> PostResult | None:

@@ -8,7 +8,9 @@ from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.units import DEG
 
 MARGIN = 0.85
-"""of what is left for linearising: deviations are looked at in samples, the read-back looks at others"""
+"""of what is left for linearising: the read-back bounds deviations by other parts of the blocks"""
+FILLED = 0.98
+"""the same where it may be used up: what the read-back then bounds beyond the tolerance is refused"""
 POINTS = 0.5
 """of the share for linearising that --smooth may move points by"""
 
@@ -19,11 +21,12 @@ def tolerance_shares(job: Job) -> tuple[dict[str, float], list[Diagnostic]]:
     bound = job.rounding
     kinematics = job.controller.kinematics
     smoothing = job.smoothing.most
+    margin = FILLED if job.options.filled else MARGIN
     axis_smoothing = kinematics.axis_smoothing_share * axis
     shares = {"smoothing": smoothing, "axis_smoothing": axis_smoothing,
               "rounding": bound.tip, "axis_rounding": bound.axis / DEG,
-              "linearising": MARGIN * (tolerance - smoothing - bound.tip),
-              "axis_linearising": MARGIN * (axis - axis_smoothing - bound.axis / DEG)}
+              "linearising": margin * (tolerance - smoothing - bound.tip),
+              "axis_linearising": margin * (axis - axis_smoothing - bound.axis / DEG)}
     if job.corrects:
         from postproc.correction.compensation import SHARE
 

@@ -42,7 +42,7 @@ def numbered(toolpath: Toolpath, setup: SetupFile, file: str = "") -> tuple[Tool
         return toolpath, found + more
     missing, proposed = without_number(toolpath, setup)
     found += missing
-    toolpath, more = with_loads(toolpath)
+    toolpath, more = with_loads(toolpath, asked)
     if proposed:  # what is wrong with the loads shows where all tools have numbers
         whole = setup.model_copy(update={"tool_numbers": {**setup.tool_numbers, **proposed}})
         more = [*more, *(d for d in numbered(given, whole)[1] if d.code == "tool.not_loaded")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from postproc.reference.events import TOOL_WORDS, cutting, numbers
 from postproc.reference.same_tool import differ, differ_in_length
 from postproc.setup.model import SetupFile
-from toolpaths.arrays import Array, Bools
+from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error, info
 from toolpaths.toolpath import Event, Role, Tool, Toolpath
 
@@ -43,18 +44,19 @@ def with_tools(toolpath: Toolpath) -> Toolpath:
                    tools=(*toolpath.tools, Tool(0)))
 
 
-def with_loads(toolpath: Toolpath) -> tuple[Toolpath, list[Diagnostic]]:
+def with_loads(toolpath: Toolpath, asked: Collection[str] = ()) -> tuple[Toolpath, list[Diagnostic]]:
     """The path with LOADTL where its rows begin with a tool that has a number and that no record has loaded
-    by then: at the beginning of the file, and in files without any such record at every change."""
+    by then: at the beginning of the file, in files without any such record at every change, and behind one for
+    tools that the set-up numbers (`asked`: their names in capitals)."""
     events, number = toolpath.events, _numbers(toolpath)
     loads = [e for e in events if e.word in TOOL_WORDS and numbers(e)]
-    if not len(toolpath) or (loads and loads[0].index == 0):
+    if not len(toolpath):
         return toolpath, []
     stop = loads[0].index if loads else len(toolpath)
-    if loads and not cutting(toolpath)[:stop].any() and int(numbers(loads[0])[0]) == number[0]:
+    if stop and loads and not cutting(toolpath)[:stop].any() and int(numbers(loads[0])[0]) == number[0]:
         return replace(toolpath, events=_loaded_first(events, loads[0])), []
     begins = np.flatnonzero(np.diff(number[:stop], prepend=-1) != 0)
-    begins = begins[number[begins] > 0]
+    begins = np.concatenate([begins[number[begins] > 0], _numbered_behind(toolpath, number, loads, asked)])
     result = list(events)
     for row in begins[::-1].tolist():
         at = next((k for k, e in enumerate(result) if e.index >= row), len(result))
@@ -67,13 +69,35 @@ def with_loads(toolpath: Toolpath) -> tuple[Toolpath, list[Diagnostic]]:
              lines=toolpath.line[begins][:6].tolist(), count=len(begins))]
 
 
+def _numbered_behind(toolpath: Toolpath, number: Ints, loads: list[Event], asked: Collection[str]) -> Ints:
+    """Rows behind the first load at which a tool must be called: where it begins to be used and cuts while another is
+    loaded, if the set-up numbers it, or another one was called so before it."""
+    found: list[int] = []
+    if not loads or not asked:
+        return np.array(found, dtype=np.int64)
+    begins = np.flatnonzero(np.diff(number, prepend=-1) != 0)
+    cuts = np.append(np.flatnonzero(cutting(toolpath)), len(toolpath))
+    first = cuts[np.searchsorted(cuts, begins)]
+    at = np.array([e.index for e in loads])
+    by_then, by_end = (np.searchsorted(at, rows, "right") for rows in (first, np.append(begins[1:], len(toolpath)) - 1))
+    loaded, before = 0, 0
+    for row, cut, end, then, ends in zip(begins, first, np.append(begins[1:], len(toolpath)), by_then, by_end, strict=True):
+        loaded = int(numbers(loads[then - 1])[0]) if then > before else loaded
+        named = bool(found) or named_by(toolpath.tools[toolpath.tool[row]]) in asked
+        if cut < end and 0 < loaded != number[row] > 0 and named:
+            found.append(int(row))
+            loaded = int(number[row])
+        loaded, before = int(numbers(loads[ends - 1])[0]) if ends > max(then, before) else loaded, int(ends)
+    return np.array(found, dtype=np.int64)
+
+
 def _loaded_first(events: tuple[Event, ...], load: Event) -> tuple[Event, ...]:
     """The events with the first load before all motion: the rapids before it are made with its tool."""
     rest = [e for e in events if e is not load]
     return (replace(load, index=0), *rest)
 
 
-def _numbers(toolpath: Toolpath) -> Array:
+def _numbers(toolpath: Toolpath) -> Ints:
     return np.array([t.number for t in toolpath.tools] + [-1])[toolpath.tool]
 
 

@@ -14,6 +14,7 @@ from postproc.base.options import Options
 from postproc.base.progress import Progress
 from postproc.control.control import Control
 from postproc.job.job import Job
+from postproc.readback.comparison.approaches import check_safe_planes
 from postproc.readback.comparison.clamps import check_clamps, check_index
 from postproc.readback.comparison.compare import Comparison, compare
 from postproc.readback.comparison.faults import Faults
@@ -125,6 +126,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
                *check_stops(code, motion, job, faults), *check_clamps(whole, motion, job, comparison.owner, faults),
                *check_options(code, motion, job, faults), *check_index(motion, job, home, comparison.owner, faults),
+               *check_safe_planes(motion, executed, job, home, comparison.owner, faults),
                *check_hooks(data, code, motion, job, comparison.owner, faults),
                *check_stock(data, job, faults), *_bodies(motion, executed, job, comparison, faults)]
     noted = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)

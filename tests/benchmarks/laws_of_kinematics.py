@@ -9,6 +9,9 @@ the law allows there, mm per joint by which the rates are off central difference
 from __future__ import annotations
 
 import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import numpy as np
 

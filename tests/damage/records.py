@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from toolpaths.arrays import Bools
 from toolpaths.cl.read import ReadResult, read_bytes
 from toolpaths.diagnostics import has_errors
-from toolpaths.toolpath import Arcs, Toolpath
+from toolpaths.toolpath import Role, Toolpath
 
 NX = """\
 TOOL PATH/A,TOOL,M10
@@ -138,7 +139,73 @@ TLAXIS/ 0.0,0.0,1.0
 GOTO  /    20.00000,    0.00000,   -3.00000
 FINI
 """
-FILES = {"nx": NX, "apt": APT, "creo": CREO, "indexed": INDEXED, "solidworks": SOLIDWORKS, "catia": CATIA}
+ARCS = """\
+$$*CATIA0
+UNITS/MM
+LOADTL/1
+SPINDL/3000.0,RPM,CLW
+FEDRAT/250.0,MMPM
+GOTO/10.0,0.0,0.0
+AUTOPS
+INDIRV/0.0,1.0,0.0
+TLON,GOFWD/ (CIRCLE/0.0,0.0,0.0,10.0),ON,(LINE/0.0,0.0,0.0,0.0,10.0,0.0)
+GOTO/0.0,20.0,0.0
+PSIS/(PLANE/(POINT/0.0,20.0,0.0),PERPTO,(VECTOR/1.0,0.0,0.0))
+INDIRV/0.0,1.0,0.0
+TLON,GOFWD/(CYLNDR/0.0,20.0,10.0,1.0,0.0,0.0,10.0),ON,$
+(PLANE/PERPTO,(PLANE/(POINT/0.0,20.0,0.0),PERPTO,(VECTOR/1.0,0.0,0.0)),(POINT/0.0,20.0,10.0),(POINT/0.0,30.0,10.0))
+GOTO/0.0,30.0,20.0
+FINI
+"""
+SPLINE = """\
+TOOL PATH/A,TOOL,M10
+TLDATA/MILL,10.0000,0.0000,75.0000,0.0000,0.0000
+MSYS/0.0000,0.0000,5.0000,1.0,0.0,0.0,0.0,1.0,0.0
+LOAD/TOOL,1
+SELECT/TOOL,2
+SPINDL/RPM,3000,CLW
+FEDRAT/MMPM,250.0000
+GOTO/0.0000,0.0000,5.0000,0.0,0.0,1.0
+NURBS/
+KNOT/0.5,1.0
+CNTRL/2.0,1.0,5.0
+CNTRL/4.0,3.0,5.0
+CNTRL/6.0,3.0,5.0
+CNTRL/8.0,0.0,5.0
+GOTO/9.0000,0.0000,5.0000
+TLAXIS/0.6,0.0,0.8
+GOTO/9.0000,3.0000,5.0000
+SPINDL/OFF
+GOHOME/0.0,0.0,90.0
+END-OF-PATH
+"""
+TURNED = """\
+PARTNO/ SAMPLE
+UNITS/ MM
+OPFEATSTART/ FACE
+CUTTER/ 10.0,0.0,0.0,0.0,0.0,75.0,
+TLAXIS/ 0.600000,0.000000,0.800000
+LOAD/ TOOL,1
+SPINDL/ 3000,RPM, CLW
+COOLNT/ FLOOD
+ROTABL/ 0.643501108793284,BAXIS,TABLE,CCLW
+MOVE_ATTRIB/LEADIN,1
+RAPID
+GOTO/ 40.0,0.0,80.0
+FEDRAT/ MMPM,250.0
+GOTO/ 40.0,0.0,29.0
+CIRCLE/ 40.0,5.0,29.0,0.0,0.0,1.0,5.0,COUNTERCLOCKWISE
+GOTO/ 45.0,5.0,29.0
+CYCLE/ ON
+CYCLE/ DRILL,G98,12.0,MMPM,120.0,3.0,20.0 20.0 DWELL,0.0
+GOTO/ 30.0,5.0,29.0
+CYCLE/ OFF
+ROTABL/ -0.643501108793284,BAXIS,TABLE,CCLW
+OPFEATEND/
+FINI
+"""
+FILES = {"arcs": ARCS, "spline": SPLINE, "turned": TURNED,
+         "nx": NX, "apt": APT, "creo": CREO, "indexed": INDEXED, "solidworks": SOLIDWORKS, "catia": CATIA}
 LEFT_OUT = ("PAINT", "$$ ", "PARTNO", "MACHIN", "SETUP", "$$-> END", "$$-> MFGNO", "TPRINT")
 """Lines that say nothing to the machine: names, display, comments."""
 
@@ -202,18 +269,22 @@ def outcome(result: ReadResult, whole: ReadResult) -> str:
 
 
 def shape(p: Toolpath) -> object:
-    """All of a toolpath but its numbers and names."""
-    rows = [column.tolist() for column in (p.kind, p.role, p.arc, p.pass_, np.isfinite(p.feed), p.feed_mode)]
-    events = [(e.index, e.word, tuple(v if isinstance(v, str) else 0.0 for v in e.values)) for e in p.events
+    """All of a toolpath but its numbers and names; a spline is its end, however many pieces follow it."""
+    within = np.isin(p.role, (Role.SPLINE, Role.CUBIC))
+    kept = ~(within | np.append(False, within[:-1]))
+    rows = [column[kept].tolist() for column in (p.kind, p.role, p.arc >= 0, p.pass_, np.isfinite(p.feed), p.feed_mode)]
+    splines = int((within[:-1] > within[1:]).sum())
+    number = np.cumsum(np.append(0, kept))
+    events = [(int(number[e.index]), e.word, tuple(v if isinstance(v, str) else 0.0 for v in e.values)) for e in p.events
               if e.word not in ("PPRINT", "INSERT")]
     tools = [(t.shape, t.diameter is None, t.corner_radius is None, len(t.cutter), t.length_register is None)
              for t in p.tools]
     cycles = [(c.kind, c.retract is None, len(c.steps)) for c in p.cycles]
-    return len(p), rows, events, tools, cycles, _arcs(p.arcs), len(p.operations), len(p.frames), p.units
+    return splines, rows, events, tools, cycles, _arcs(p, kept), len(p.operations), len(p.frames), p.units
 
 
-def _arcs(a: Arcs) -> list[object]:
-    return [bool(s > np.pi) for s in a.sweep]
+def _arcs(p: Toolpath, kept: Bools) -> list[object]:
+    return [bool(p.arcs.sweep[a] > np.pi) for a in p.arc[kept] if a >= 0]
 
 
 def read(data: bytes) -> ReadResult:

@@ -177,7 +177,7 @@ def stages() -> dict[str, Stage]:
     """What pages need besides those of `shop`, by their places in the project; made when a page is run."""
     return {
         "README.md": Stage(
-            files={"shop.toml": "", "part.cls": part(2),
+            files={"shop.toml": "", "part.cls": part(1),
                    **{f"samples/{name}.cls": part(1) for name in ("pocket", "five_faces")}},
             copies={"measurements.toml": "samples/calibration/reversal.toml",
                     "reversal.csv": "samples/calibration/reversal.csv",
@@ -185,7 +185,7 @@ def stages() -> dict[str, Stage]:
                     **{f"mikron-ucp710-{axis}.csv": f"samples/errors/mikron-ucp710-{axis}.csv" for axis in "XYZ"}},
             before={"time part.ngc -m mikron-ucp710 -c linuxcnc --calibrate": partial(logged, "part.ngc", "linuxcnc"),
                     "place": _placed},
-            instead={"setup new part.cls": "setup new part.cls --yes", "-j 4": "-j 1", "--pass 3": "--pass 1",
+            instead={"setup new part.cls": "setup new part.cls --yes", "-j 4": "-j 1", "--pass 3": "--pass 0",
                      "--line 40": "--line 15",
                      " --figures pictures": "", "-m trunnion-bc -c fanuc-30i": "-c fanuc-30i",
                      "orient part.cls": "orient part.cls --max-tilt 5", "--orient auto": "--orient auto --max-tilt 5"}),

@@ -18,10 +18,14 @@ def _case(code: str, says: str, ini: str, *does: Edit, **files: str) -> HintCase
 
 TABLE = "$MC_TRAFO_TYPE_1=40\n$MC_TRAFO5_AXIS1_1[0]=-1\n$MC_TRAFO5_BASE_TOOL_1[2]=-600\n"
 RECORD = '$TC_CARR23[1]="P"\n$TC_CARR7[1]=-1\n$TC_CARR6[1]=-600\n$TC_CARR46[1]=0.004\n'
+TABLE_530 = "KEY AXIS COORD\nMachAxis X\nMachAxis Y\nMachAxis Z\nTrans Z -500\nMachAxis C\n[END]\n"
 
 IMPORTS = [
     _case("import.line", r"write (\$NAME\[index\] = value)", TABLE + "$MA_MAX_AX_VELO(X1)=30000\n",
           Edit("shop.ini", "(X1)", "[X1]")),
+    _case("import.default", "(lines) that are not 0 there", TABLE, Edit("shop.ini", "", "".join(
+        f"$MC_TRAFO5_{name}_1[{k}]=0\n" for name, k in [("AXIS1", 1), ("AXIS1", 2), ("BASE_TOOL", 0), ("BASE_TOOL", 1), *(
+            ("JOINT_OFFSET", k) for k in range(3))]))),
     _case("import.fine", "add them to the vectors", RECORD, Edit("shop.ini", "=-600\n$TC_CARR46[1]=0.004", "=-599.996")),
     _case("import.unit", "write one of (mm),", XYZ.replace("UNITS = mm", "UNITS = elle"), Edit("shop.ini", "elle", r"\1")),
     _case("import.geometry", r"STRUCTURE = (w A' b X Y Z \(C1\) t), POINT_A = (0 0 0)",
@@ -40,6 +44,10 @@ IMPORTS = [
     _case("import.file", "put the file where the INI names it", XYZ + "#INCLUDE more.inc\n", Edit("more.inc", "", "[A]\n")),
     _case("import.format", "name the form with (--format)", "x = 1\n", Edit("shop.ini", "", XYZ), Edit(
         COMMAND, "shop.toml", r"shop.toml \1 linuxcnc-ini")),
+    HintCase("import.format", "machine import kin.txt -o shop.toml", {"kin.txt": "CfgKinSimpleAxis(key := A)\n"},
+             "rows Trans before each (MachAxis)", (Edit("kin.txt", "", TABLE_530),)),
+    HintCase("import.kinematics", "machine import kin.tab -o shop.toml", {"kin.tab": TABLE_530.replace("[END]", "")},
+             r"with its last line, (\[END\])", (Edit("kin.tab", "MachAxis C\n", "MachAxis C\n\\1\n"),)),
     _case("import.assumed", "(--set) KEY=VALUE", XYZ, *(Edit(COMMAND, "-o shop.toml", f"-o shop.toml {given}") for given in (
         " ".join(f"--set axes.{axis}.{key}=90" for axis in "XYZ" for key in ("velocity", "acceleration", "jerk", "home")),
         "--set timing.tool_change=5 --set timing.clamp=0 --set timing.unclamp=0"))),

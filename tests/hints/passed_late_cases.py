@@ -64,12 +64,18 @@ _ERRORS = [
                    r"convert part.apt -m mikron-ucp710 -c linuxcnc --setup s.toml \1 \2 -o p.ngc"),)),
 ]
 CONTRADICTED = "TRANS / 0.0000000000, 0.0000000000, 56.66", "TRANS / 0.0000000000, 0.0000000000, 59.66"
+INDEXES = ("$$-> MFGNO/X\nUNITS/MM\nFEDRAT/100,MMPM\nROTATE/AAXIS,INCR,-30\nRAPID\nGOTO/0,0,50\nGOTO/9,0,40\n"
+           "ROTATE/AAXIS,-45\nRAPID\nGOTO/0,0,50\nFINI\n")
 COARSE = 'base = "fanuc-30i"\n[format]\nlinear_decimals = 2\n'
 PECKED = "RAPID\nGOTO/0,0,50\nCYCLE/DEEP,DEPTH,5,MMPM,60,CLEAR,3,STEP,2,0.001\nGOTO/5,5,0\nCYCLE/OFF\n"
 SPOKEN = "SPINDL/RPM,1000,CLW"
 _RECORDS = [
     HintCase("cl.index-frame", "inspect part.ncl", {"part.ncl": INDEXED.replace(*CONTRADICTED)},
              "correct ROTATE, (TRANS)", (Edit("part.ncl", *reversed(CONTRADICTED)),)),
+    HintCase("cl.index-frame", "inspect part.ncl", {"part.ncl": INDEXES}, "state the angle with (INCR)",
+             (Edit("part.ncl", "-45", r"\1,-45"),)),
+    HintCase("cl.index-frame", "inspect part.ncl", {"part.ncl": INDEXES}, "or a (CSYS) remark behind it",
+             (Edit("part.ncl", "-45\n", r"-45\n$$-> \1/1,0,0,0,0,0.258819,-0.965926,0,0,0.965926,0.258819,0\n"),)),
     convert("cycle.peck", START + PECKED, "state a larger (STEP)", part("STEP,2,0.001", r"\1,2,0.5"),
             c=COARSE, more=" --tolerance 0.05"),
     convert("cycle.peck", START + PECKED, r"in one go \((CYCLE/DRILL)\)",
@@ -139,6 +145,11 @@ _INDEX = [
              r'write (index = "plane") under \[clearance\]', (sheet('index = "home"', r"\1"),),
              first=(f"convert part.apt {_ON} -o p.nc --output-mode axes",),
              harm=(Edit("s.toml", '"plane"', '"home"'),)),
+    HintCase("verify.safe_plane", f"verify p.nc part.apt {_ON}",
+             {"part.apt": START + TURNED + "FINI\n", "s.toml": LENGTH + "[clearance]\ndistance = 60\n"},
+             r"write (distance = [\d.]+) under \[clearance\]", (sheet("distance = 80", r"\1"),),
+             first=(f"convert part.apt {_ON} -o p.nc --output-mode axes",),
+             harm=(Edit("s.toml", "= 60", "= 80"),)),
 ]
 SAMPLE_KIND = SAMPLE.read_text("utf-8")
 LONG = "tip[:, 2] + self.tool_length", "tip[:, 2] + 0.0"

@@ -46,6 +46,8 @@ _PATHS = [
             setup=LONG + "[part]\norigin = [-22.0776, -45.6804, 0.0]\n", machine="rotary-delta", control="siemens-840d"),
     convert("compensation.range", START + WIDE, "or take (--error-model-beyond)", option(r" \1", ""), setup=LENGTH,
             more=" --error-model e.toml", code_left=True, e=KNOWN),
+    convert("compensation.axis", START + WIDE, r"(--axis-tolerance 0\.19) where", option(r" \1", ""), setup=LENGTH,
+            more=" --error-model e.toml", e="[location]\nEB0S = 600\n"),
     convert("rollover.standing", START + TURNED, r"leave (restart = true) out of the set-up",
             sheet("restart = true", "restart = false"), m=ROLLING, setup=LENGTH + "[output]\nrestart = true\n",
             more=" --output-mode axes"),

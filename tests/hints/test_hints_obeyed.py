@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import Any
@@ -17,12 +19,15 @@ from tests.explained_codes import DATA
 from tests.hints.call_cases import CALLS, CallCase
 from tests.hints.case import HintCase, called
 from tests.hints.cases import CASES, OF_PROGRAMS
+from tests.margins import looked_at
 from toolpaths.diagnostics import REPORT, Severity
 
 EXPLAINED = tomllib.loads((DATA / "codes.toml").read_text("utf-8"))
 """messages and remedies by code; `tests/postproc/explain` compares them with the source"""
 VERDICTS = frozenset({"do not run this program"})
 """what is said of a program that is wrong: no remedy, the fault is in the project or in what others have edited"""
+OF_LENGTHS = "tool-table.outside"
+"""the code whose hint says by how much lengths of tools may be off"""
 NOTHING = "nothing is to be done"
 """how a hint begins that only says what was taken and why that is right: no remedy"""
 
@@ -37,18 +42,20 @@ def remedies(hints: list[str]) -> list[str]:
     return [hint for hint in hints if hint not in VERDICTS and not hint.startswith((NOTHING, REPORT))]
 
 
-@pytest.fixture(autouse=True)
-def few_places(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(autouse=True, scope="module")
+def few_places() -> Iterator[None]:
     """What a model of errors does at each of many places changes figures of `errors check`, and no hint; so do the boxes
     after which a certificate gives up, the layouts that are tried, and the band of a program's time."""
-    monkeypatch.setattr(survey, "PLACES", 500)
-    monkeypatch.setattr(conversion, "BAND_UP_TO", 0)
-    for name in ("MOST", "FEW"):
-        monkeypatch.setattr(f"machines.analysis.certify.{name}", 500)
-    for name, value in FEW_PLACES.items():
-        monkeypatch.setattr(f"machines.analysis.{name}", value)
-    for name, value in (("RESTARTS", 1), ("ROUNDS", 12), ("CROWD", 6), ("GRID", (3, 3, 2))):
-        monkeypatch.setattr(layouts, name, value)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(survey, "PLACES", 500)
+        patch.setattr(conversion, "BAND_UP_TO", 0)
+        for name in ("MOST", "FEW"):
+            patch.setattr(f"machines.analysis.certify.{name}", 500)
+        for name, value in FEW_PLACES.items():
+            patch.setattr(f"machines.analysis.{name}", value)
+        for name, value in (("RESTARTS", 1), ("ROUNDS", 12), ("CROWD", 6), ("GRID", (3, 3, 2))):
+            patch.setattr(layouts, name, value)
+        yield
 
 
 @pytest.mark.parametrize("case", CALLS, ids=[case.code for case in CALLS])
@@ -64,7 +71,8 @@ def test_a_hint_to_who_calls_the_package_is_obeyed(case: CallCase, tmp_path: Pat
 
 @pytest.mark.parametrize("case", OF_PROGRAMS.values(), ids=OF_PROGRAMS)
 def test_a_hint_obeyed_is_the_end_of_its_fault(case: HintCase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert not faults_of(case, tmp_path, monkeypatch)
+    with looked_at() if case.code == OF_LENGTHS else nullcontext():
+        assert not faults_of(case, tmp_path, monkeypatch)
 
 
 def faults_of(case: HintCase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:

@@ -9,6 +9,7 @@ from tests.hints.machine_cases import machine_text
 WEAK = 'base = "mill-3axis"\n[dynamics.axes.Z]\nmass = 40\nforce = 300\n'
 TWO = "UNITS/MM\n" + nx("EM12", 0, 12) + nx("EM6", 0, 6)
 NAMES = '[tool_numbers]\n"EM12" = 1\n"EM6" = 2\n[tools.1]\ngauge_length = 100.0\n[tools.2]\ngauge_length = 80.0\n'
+NUMBERED = START + "TOOLNO/1,MILL,12,0\n" + CUT + "TOOLNO/2,MILL,6,0\n" + CUT
 SIDE = START + "RAPID\nGOTO/0,0,5,0,0,1\nGOTO/0,0,0\nRAPID\nGOTO/0,0,50,1,0,0\nGOTO/0,9,50\n"
 SAME = "UNITS/MM\n" + nx("EM12", 2, 12) + nx("EM6", 2, 6) + nx("EM8", 2, 8) + nx("EM5", 1, 5)
 NUMBERS = r"\[tool_numbers\]\n(?s:(.*))"
@@ -37,13 +38,10 @@ _TOOLS = [
     ),
     convert(
         "tool.not_loaded",
-        TWO[: TWO.rindex("LOAD/TOOL,0\n")] + TWO[TWO.rindex("LOAD/TOOL,0\n") + 12 :],
-        r"put (LOAD/TOOL) or LOADTL before it",
-        part(
-            "SPINDL/RPM,1000,CLW\nFEDRAT/MMPM,600\n" + CUT + "END-OF-PATH\nFINI",
-            r"\1,0\nSPINDL/RPM,1000,CLW\nFEDRAT/MMPM,600\n" + CUT + "END-OF-PATH\nFINI",
-        ),
-        setup=NAMES,
+        NUMBERED,
+        r"put LOAD/TOOL or (LOADTL) before it",
+        part("MILL,6,0\n", r"MILL,6,0\n\1/2\n"),
+        setup=LENGTH + "[tools.2]\ngauge_length = 80.0\n",
     ),
     convert(
         "tool.missing",

@@ -12,6 +12,8 @@ SCALE = 100.0
 """mm per rad: weighs angles against lengths in condition numbers"""
 CALM = 30.0
 """condition number"""
+POOL = 2000
+"""poses of a machine that its laws share"""
 
 
 @cache
@@ -49,6 +51,23 @@ def poses(m: Machine, n: int, seed: int = 1, calm: bool = True) -> tuple[np.ndar
     q, tip, axis = branches[0][real][:n], tip[real][:n], axis[real][:n]
     keep = condition(m, q, tip, axis) < CALM if calm else slice(None)
     return q[keep], tip[keep], axis[keep]
+
+
+@cache
+def _pool(name: str) -> tuple[np.ndarray, ...]:
+    """`POOL` poses of a machine, drawn once for all its laws, with whether each is calm."""
+    m = machine(name)
+    drawn = poses(m, POOL, calm=False)
+    calm = np.ones(len(drawn[0]), bool) if m.kinematics.straight_slides else condition(m, *drawn) < CALM
+    return *drawn, calm
+
+
+def shared_poses(name: str, n: int, seed: int = 1, calm: bool = True) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`poses` out of those that all laws of a machine share: others for each seed."""
+    *drawn, still = _pool(name)
+    some = np.flatnonzero(still) if calm else np.arange(len(still))
+    q, tip, axis = (x[np.random.default_rng(seed).permutation(some)[:n]] for x in drawn)
+    return q, tip, axis
 
 
 @cache

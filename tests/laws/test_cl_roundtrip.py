@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
+from hypothesis.internal.conjecture import providers
 
 from toolpaths import write
 from toolpaths.cl.read import ReadResult, read_bytes
@@ -18,6 +19,8 @@ from toolpaths.cl.text.source import normalise
 from toolpaths.diagnostics import Severity, has_errors
 from toolpaths.toolpath import FeedMode, Toolpath
 
+# Constants of the project's own source are no likelier faults; hypothesis parses all of it, in each worker, for them.
+providers.is_local_module_file = lambda file: False
 SLOW = settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 number = st.one_of(st.integers(-500, 500).map(str), st.floats(-1e4, 1e4).map(lambda x: f"{x:.4f}"),
                    st.floats(-1e3, 1e3).map(repr), st.sampled_from([".5", "-0", "1.", "-.25", "+3", "1E2", "2.5e-3"]))

@@ -9,12 +9,11 @@ from machines.kinematics.serial import Serial
 from tests.machines.own_kinds import OWN
 
 pytestmark = pytest.mark.parametrize("name", [*machines.names(), *OWN])
-MANY = 2_000
 
 
 def test_forward_of_inverse_is_identity(name):
     m = law.machine(name)
-    _, tip, axis = law.poses(m, MANY, calm=False)
+    _, tip, axis = law.shared_poses(name, law.POOL, calm=False)
     branches = m.kinematics.inverse(tip, axis)
     assert branches.shape == (m.kinematics.branches, len(tip), m.kinematics.joints)
     assert np.isfinite(branches).any(axis=(0, 2)).all()
@@ -30,7 +29,7 @@ def test_forward_of_inverse_is_identity(name):
 
 def test_inverse_of_forward_contains_the_joints(name):
     m = law.machine(name)
-    q, tip, axis = law.poses(m, MANY, seed=2, calm=False)
+    q, tip, axis = law.shared_poses(name, law.POOL, seed=2, calm=False)
     tip, axis = m.kinematics.forward(q, near=np.hstack([tip, axis]))
     found = law.gap(m, m.kinematics.inverse(tip, axis), q).max(axis=2).min(axis=0)
     beyond = found > 1e-9
@@ -41,7 +40,7 @@ def test_inverse_of_forward_contains_the_joints(name):
 
 def test_branches_are_joint_positions_that_the_inverse_gives_again(name):
     m = law.machine(name)
-    _, tip, axis = law.poses(m, 600, seed=3)
+    _, tip, axis = law.shared_poses(name, 300, seed=3)
     for q in m.kinematics.inverse(tip, axis):
         found = law.gap(m, m.kinematics.inverse(*m.kinematics.forward(q, np.hstack([tip, axis]))), q)
         assert np.nanmax(np.nanmin(found.max(axis=2), axis=0)) < 1e-6
@@ -49,14 +48,14 @@ def test_branches_are_joint_positions_that_the_inverse_gives_again(name):
 
 def test_rotary_joints_are_principal_values(name):
     m = law.machine(name)
-    _, tip, axis = law.poses(m, 1200, seed=4)
+    _, tip, axis = law.shared_poses(name, 600, seed=4)
     turned = m.kinematics.inverse(tip, axis)[..., np.array(m.rotary)]
     assert np.all((turned > -np.pi) & (turned <= np.pi))
 
 
 def test_jacobian_equals_central_differences(name):
     m = law.machine(name)
-    _, tip, axis = law.poses(m, 600, seed=5)
+    _, tip, axis = law.shared_poses(name, 200, seed=5)
     near = np.hstack([tip, axis])
     q = m.kinematics.inverse(tip, axis)[0]
     jacobian = m.kinematics.jacobian(q, near)
@@ -76,7 +75,7 @@ def test_jacobian_equals_central_differences(name):
 def test_slides_run_as_the_jacobian_has_them(name):
     """To the last bit, so that no program depends on which of them was asked; in any order, some of them, all joints."""
     m = law.machine(name)
-    q, _, _ = law.poses(m, 20, seed=8, calm=False)
+    q, _, _ = law.shared_poses(name, 20, seed=8, calm=False)
     slides = np.flatnonzero(~np.array(m.rotary))
     for some in (slides, slides[::-1], slides[1:2], np.arange(m.kinematics.joints)):
         np.testing.assert_array_equal(m.kinematics.slide_directions(q, some), m.kinematics.jacobian(q)[:, :3][:, :, some])
@@ -84,7 +83,7 @@ def test_slides_run_as_the_jacobian_has_them(name):
 
 def test_twist_agrees_with_the_jacobian(name):
     m = law.machine(name)
-    _, tip, axis = law.poses(m, 600, seed=6)
+    _, tip, axis = law.shared_poses(name, 200, seed=6)
     near = np.hstack([tip, axis])
     q = m.kinematics.inverse(tip, axis)[0]
     jacobian, twist = m.kinematics.jacobian(q, near), m.kinematics.twist_jacobian(q, near)
@@ -95,8 +94,7 @@ def test_twist_agrees_with_the_jacobian(name):
 
 def test_a_batch_equals_its_points_one_by_one(name):
     m = law.machine(name)
-    q, tip, axis = law.poses(m, 1000, seed=7)
-    q, tip, axis = q[:20], tip[:20], axis[:20]
+    q, tip, axis = law.shared_poses(name, 8, seed=7)
     batch = m.kinematics.inverse(tip, axis)
     poses = m.kinematics.pose(q)
     rates = m.kinematics.jacobian(q)
@@ -118,7 +116,7 @@ def test_no_points_give_no_joints(name):
 
 def test_the_tip_of_a_tool_lies_its_length_below_the_gauge_point(name):
     m = law.machine(name)
-    _, tip, axis = law.poses(m, 1200, seed=8)
+    _, tip, axis = law.shared_poses(name, 400, seed=8)
     long = m.kinematics.with_tool(123.5)
     assert long.tool_length == 123.5 and m.kinematics.tool_length == 0.0
     q = m.kinematics.inverse(tip, axis)
@@ -133,7 +131,7 @@ def test_the_tip_of_a_tool_lies_its_length_below_the_gauge_point(name):
 def test_every_value_of_a_free_joint_gives_the_same_pose(name):
     m = law.machine(name)
     k = m.kinematics
-    _, tip, axis = law.poses(m, 100, seed=9)
+    _, tip, axis = law.shared_poses(name, 100, seed=9)
     q = k.inverse(tip, axis)[0]
     turning = k.twist_jacobian(q, np.hstack([tip, axis]))[:, 3:, np.array(m.rotary)]
     seen = 0
@@ -164,7 +162,7 @@ def test_nearest_axis_is_reachable_idempotent_and_keeps_what_is_in_reach(name):
     near = k.nearest_axis(wild)
     np.testing.assert_allclose(np.linalg.norm(near, axis=1), 1.0, rtol=0, atol=1e-12)
     np.testing.assert_array_equal(k.nearest_axis(near), near)
-    _, tip, axis = law.poses(m, 500, seed=11)
+    _, tip, axis = law.shared_poses(name, 500, seed=11)
     np.testing.assert_array_equal(k.nearest_axis(axis), axis)
     best = (near @ axis.T).max(axis=1)  # near must not be beaten by any direction the machine is known to take
     assert ((wild * near).sum(axis=1) >= (wild @ axis.T).max(axis=1) - 1e-9).all(), best.min()
@@ -186,7 +184,7 @@ def test_joints_outside_the_loops_take_the_pose_along_in_its_mode(name):
     outside = ~np.array(m.kinematics.in_loops)
     if m.kinematics.transmits is None or not outside.any():
         return
-    q, tip, axis = law.poses(m, 20, seed=7)
+    q, tip, axis = law.shared_poses(name, 20, seed=7)
     far = q + outside * np.where(m.rotary, 2.0, 300.0) * np.random.default_rng(7).uniform(-1.0, 1.0, q.shape)
     pose = m.kinematics.carried(np.hstack([tip, axis]), q, far)
     assert np.abs(pose[:, :3] - tip).max() > 20.0

@@ -163,6 +163,8 @@ class ToolpathBuilder:
         """turned machine to part, by ROTATE alone (Creo)"""
         self.table_here: Floats = np.eye(3)
         """the same where the last system was stated"""
+        self.turn_doubt = ""
+        """what is not known of the angle of ROTATE (Creo), until a system is stated"""
         self.turns_at: list[int] = []
         """rows before which ROTATE stands"""
         self.about_axis = False

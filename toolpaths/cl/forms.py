@@ -78,7 +78,7 @@ FORMS: dict[str, RecordForm] = {
     "UNIT": RecordForm(frozenset(UNIT_WORDS), frozenset({0}), False),
     "MULTAX": _form("ON OFF", 0),
     "STOP": _MESSAGE, "OPSTOP": _MESSAGE, "FINI": _ALONE, "END": _ALONE, "END-OF-PATH": _ALONE, "ENDSUB": _form("", 0, 1),
-    "NURBS": _ALONE, "AUTOPS": _ALONE,
+    "NURBS": _ALONE, "KNOT": _form("", closed=True, gaps=True), "CNTRL": _form("", 3, closed=True), "AUTOPS": _ALONE,
     "DELAY": _form("REV SEC TIME NOW NEXT", 1), "DWELL": _form("REV SEC TIME NOW NEXT", 1),
     "CALSUB": _form("", 0, 1, named=True), "DEFSUB": _form("", 0, 1, named=True),
     "OPSKIP": _form("ON OFF", 0, 1), "DELETE": _form("ON OFF", 0, closed=True),
@@ -102,12 +102,15 @@ _VALUED, _VALUED_IN = frozenset({"OSETNO", "ADJUST", "OFFSET", "LENGTH"}), froze
 _NAMED = frozenset({"TOOL PATH", "OPNAME", "OP_NAME", "CSI_TOOL_PATH", "OPFEATSTART", "TOOLNO", "$$->FEATNO", *TEXT_WORDS})
 _EVERYDAY = frozenset({"LOAD", "END", "STOP", "HEAD", "CHECK", "AIR", "SET", "DELETE"})
 """Words that stand in sentences too."""
-_ACTING = tuple(word for word in (*FORMS, "GOTO", "GODLTA", "MCSYS", "TOOLNO", "KNOT", "CNTRL", "TOOL PATH",
+_ACTING = tuple(word for word in (*FORMS, "GOTO", "GODLTA", "MCSYS", "TOOLNO", "TOOL PATH",
                              "TLON *, *GOFWD") if word not in _EVERYDAY and not word.startswith(DATA_COMMENT))
 _RECORD = r"(?:(?<!UN)LOAD|" + "|".join(_ACTING) + r")\s*/"
 _GLUED = pattern(r"(?:[A-Za-z0-9.)\]%\"';:!?][^A-Za-z0-9\s]?|[-=*#_]{3})(?P<record>" + _RECORD +
                     r"|(?:RAPID|FINI|END-OF-PATH|GOHOME|OPSTOP|MULTAX|ENDSUB|(?<![A-Za-z])(?<![A-Za-z]-)STOP)\s*$)")
 _BEHIND = pattern(r"\S\s+(?P<record>" + _RECORD + r"\s*[^\s/]+(?:\s*,\s*[^\s/]+)*\s*$)")
+_BARE_BEHIND = pattern(r"\s(?:RAPID|FINI|END-OF-PATH|GOHOME|OPSTOP|MULTAX|ENDSUB)\s*$|\d\s+STOP\s*$")
+_SPOKEN = frozenset({"PPWORD", "PPFUN", "OPERATION", "OPERTN", "SEQUENCE", "TITLES", "MATERL", "BEGIN", "START"})
+"""Neutral words whose parameters are words of the language, or of people, which may end in such a word."""
 _GEOMETRY = frozenset({"PSIS", "SYN"})
 """Words whose parameters hold slashes."""
 _WITHIN = pattern(_RECORD)
@@ -116,6 +119,9 @@ _NAMES = frozenset({"$$->FEATNO", "TOOL PATH", "PARTNO", "TPRINT", "OPNAME", "OP
 """Words whose parameters are a name or a text, which may hold slashes."""
 _NUMBER_LIKE = pattern(r"[-+.]*\d[-+.\d]*|[-+.\d]*[eEdD][-+.\d]*\d[-+.\d]*|[-+.]+")
 _PLANE = pattern(r"\(\s*PLANE\s*/(?:\s*[-+.\d]+\s*,){3}\s*[-+.\d]+\s*\)", re.IGNORECASE)
+_INNERMOST = pattern(r"\([^()]*\)")
+_ON_TO = pattern(r"\s*,\s*(?:ON|TO|PAST|TANTO)\s*,\s*(?:\d+\s*,\s*INTOF\s*,\s*)?", re.IGNORECASE)
+"""What is left of TLON,GOFWD without its geometry."""
 _QUOTED = pattern(r"'[^'/$]*'")
 _ONE_LETTER = pattern(r"[-+.\d]*[^-+.\d][-+.\d]*")
 _TWO_NUMBERS = pattern(r"[\d.]\s+[-+.\d]")
@@ -144,6 +150,8 @@ def fault_of(s: Statement, allow: frozenset[str] = frozenset()) -> str:
     """What is wrong with the form of a statement, "" where nothing is."""
     if s.major == COMMENT or s.major in _NAMED or s.major in NEUTRAL:
         return _joined_fault(s) or (_tdata_fault(s) if s.major == "TDATA" else "")
+    if s.major == "TLON,GOFWD":
+        return _geometry_fault(s)
     form = FORMS.get(s.major)
     if form is None or (s.major == "CLEARP" and _PLANE.fullmatch(s.body)):
         return ""
@@ -160,6 +168,8 @@ def _joined_fault(s: Statement) -> str:
             return "the name of the tool is not behind TOOL"
     if s.major in SILENT and s.major not in _GEOMETRY | _NAMES and "/" in s.body:
         return "a second slash"
+    if s.major in SILENT and s.major not in _GEOMETRY | _NAMES | _SPOKEN and (bare := _BARE_BEHIND.search(s.body.upper())):
+        return f"{bare[0].split()[-1]} stands within it: the end of a line is missing"
     pattern = _WITHIN if s.major in _NAMES else _BEHIND
     found = next((m for m in (_GLUED.search(s.body), pattern.search(s.body)) if m and _whole(s.body[_at(m):])), None)
     if found is None:
@@ -182,6 +192,14 @@ def _whole(text: str) -> bool:
         return True
     known = all(isinstance(w, float) or w in form.words or form.named for w in s.words)
     return known and not _words_fault(s, form, frozenset()) and not _numbers_fault(s, form)
+
+
+def _geometry_fault(s: Statement) -> str:
+    """TLON,GOFWD: between and behind its geometry in parentheses stand words alone, no record."""
+    words, inner = s.body, ""
+    while words != inner:
+        inner, words = words, _INNERMOST.sub(" ", words)
+    return "" if _ON_TO.fullmatch(words) else f"{words.strip()[:30]!r} is not its form: (CIRCLE/...),ON,(LINE/...)"
 
 
 def _tdata_fault(s: Statement) -> str:
@@ -210,7 +228,7 @@ def _words_fault(s: Statement, form: RecordForm, allow: frozenset[str]) -> str:
         if isinstance(word, float) or word in form.words or word in allow or _QUOTED.fullmatch(word):
             continue
         if word == "":
-            if not form.gaps and not _bare_gap(s):
+            if not form.gaps:
                 return "an empty field"
             continue
         fault = "" if form.named and word is s.words[0] and NAME.fullmatch(word) else _word_fault(word, form)
@@ -230,11 +248,6 @@ def _split_word(s: Statement, form: RecordForm) -> str:
     if s.major != "CYCLE" and any(_TWO_NUMBERS.search(part) for part in s.body.split(",")):
         return "a blank between two numbers"
     return ""
-
-
-def _bare_gap(s: Statement) -> bool:
-    """GOHOME reports its own."""
-    return s.major == "GOHOME"
 
 
 def _word_fault(word: str, form: RecordForm) -> str:
@@ -269,6 +282,8 @@ def _numbers_fault(s: Statement, form: RecordForm) -> str:
         counts = frozenset()
     if counts and count not in counts:
         return f"{count} numbers, it takes {' or '.join(map(str, sorted(counts)))}"
+    if s.major == "COOLNT" and count and isinstance(s.words[0], float) and len(s.words) > 1:
+        return "a number before its word"
     if form.lengths and any(_LEADING_ZEROS.fullmatch(part.strip()) for part in re.split(r"[,\s]+", s.body)):
         return "a number is cut off at its point"
     return ""

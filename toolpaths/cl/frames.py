@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from toolpaths.arrays import Floats
@@ -21,6 +23,7 @@ def set_system(b: ToolpathBuilder, name: str, matrix: Floats, origin: Floats) ->
     b.here = (matrix, origin)
     b.turned = np.eye(3)
     b.table_here = b.table_turn
+    b.turn_doubt = ""
     if not indexing.in_force(b):
         _name_system(b, name, matrix, origin)
     refresh(b)
@@ -210,7 +213,8 @@ _AXES = {"AAXIS": 0, "BAXIS": 1, "CAXIS": 2, "A": 0, "B": 1, "C": 2, "XAXIS": 0,
 def rotate(b: ToolpathBuilder, s: Statement) -> None:
     """ROTATE, ROTABL, ROTHED: an event. In Creo and `.clt`, points after it are in the turned frame, unless a
     system (CSYS) follows, which then says where they are. In Creo the table turns by the angle, so the frame
-    turns by less that angle in the part; in `.clt` the frame itself does, as the TLAXIS of the same operation shows."""
+    turns by less that angle in the part; in `.clt` the frame itself does, as the TLAXIS of the same operation shows.
+    INCR adds the angle, ABS and ATANGL (without it) state it; Creo's other readings are a doubt, which a system ends."""
     b.event(s.major, tuple(w for w in s.words if w != ""))
     axis = next((_AXES[w] for w in s.words if isinstance(w, str) and w in _AXES), None)
     angle = s.after("ATANGL", "INCR")
@@ -225,7 +229,20 @@ def rotate(b: ToolpathBuilder, s: Statement) -> None:
         b.log.error("cl.table", f"{s.major}/{s.body}: no axis named", b.line, "AAXIS, BAXIS or CAXIS")
         return
     turn = _radians(angle) if b.dialect.rotabl_radians and s.major != "ROTATE" else angle * DEG
-    _turn(b, axis, -turn if s.has("CLW") else turn, not s.has("ATANGL"))
+    turn, added = -turn if s.has("CLW") else turn, s.has("INCR") or not s.has("ATANGL", "ABS")
+    if b.dialect.table_frames and (doubt := _turn_doubt(s, b.table[axis], turn, added)):
+        b.turn_doubt = doubt
+    _turn(b, axis, turn, added)
+
+
+def _turn_doubt(s: Statement, old: float, turn: float, added: bool) -> str:
+    """What is not known of an angle that adds to the table's or states it, or of the way round CLW to a stated one; ""
+    where all readings turn the table alike."""
+    other = turn if added else -turn if s.has("CLW") else turn
+    position = old + turn if added else turn
+    if (added and s.has("INCR")) or abs(math.remainder(position - other, 2.0 * math.pi)) < _NO_ANGLE:
+        return ""
+    return f"{s.major}/{s.body} turns the table to {position / DEG:.6g} or to {other / DEG:.6g} degrees: unknown which"
 
 
 def _radians(angle: float) -> float:

@@ -22,6 +22,7 @@ SAME_PLACE = 0.02
 """mm between a TRANS and the translation of a CSYS remark that say the same"""
 _NO_PLACE = 1e-6
 _STEP = 1e-12
+TURN_HINT = "state the angle with INCR, as one that adds to the table's, or a CSYS remark behind it"
 TRANS_HINT = ("have Creo write the sequence with MULTAX/ON (six numbers) and without subroutines, or correct ROTATE, "
               "TRANS or the CSYS remark")
 
@@ -55,7 +56,7 @@ def turn_table(b: ToolpathBuilder, axis: int, step: float) -> None:
     old, b.table_turn = b.table_turn, b.table_turn @ rotation(np.eye(3)[axis], np.array([-step]))[0]
     z = b.turned @ b.here[0][:, 2]
     if _apart(z, old[:, 2]) > SAME_AXIS >= _apart(z, b.table_turn[:, 2]):
-        b.table_here = b.table_turn
+        b.table_here, b.turn_doubt = b.table_turn, ""
     b.turned = b.table_turn @ b.table_here.T
     b.turns_at.append(b.row)
 
@@ -84,7 +85,7 @@ def _axis_fault(b: ToolpathBuilder, matrix: Floats) -> str:
     if any(b.table) and _apart(matrix[:, 2], b.table_turn[:, 2]) > SAME_AXIS:
         return (f"by ROTATE the tool axis is ({_text(b.table_turn[:, 2])}) in the part, by the CSYS remark it is "
                 f"({_text(matrix[:, 2])})")
-    return ""
+    return b.turn_doubt
 
 
 def cancels(b: ToolpathBuilder, shift: Floats) -> bool:
@@ -162,7 +163,8 @@ def check_frames(b: ToolpathBuilder, index: Ints, local: Bools, lines: Ints) -> 
     for start, end, fault in _spans(b.frame_faults.starts, b.frame_faults.values, n):
         here = lines[start:end][local[start:end]]
         if fault and len(here):
-            b.log.error("cl.index-frame", str(fault), int(here[0]), TRANS_HINT, key=str(fault)[:20])
+            hint = TURN_HINT if "unknown which" in str(fault) else TRANS_HINT
+            b.log.error("cl.index-frame", str(fault), int(here[0]), hint, key=str(fault)[:20])
     dropped = [start for start, end, value in _spans(b.dropped_at.starts, b.dropped_at.values, n)
                if value and local[start:end].any()]
     if dropped:

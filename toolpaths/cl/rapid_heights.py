@@ -56,13 +56,13 @@ def _low_of_passes(p: Toolpath, cut: Bools, rapid: Bools) -> Ints:
     off = np.abs(p.axis - axis[number]).max(axis=1) > _SAME
     fixed = ~np.logical_or.reduceat(off & cut, start) & (number[first] == np.arange(len(start)))
     height = np.einsum("ni,ni->n", p.tip, axis[number])
-    lowest = np.minimum.reduceat(np.where(cut, _lowest(p, height), np.inf), start)
+    lowest = np.fmin.reduceat(np.where(cut, _lowest(p, height), np.inf), start)
     i, j, k = (np.round(axis[fixed] / _SAME) + _WIDE).astype(np.int64).T
     _, direction = np.unique((i * 2 * _WIDE + j) * 2 * _WIDE + k, return_inverse=True)
     _, group = np.unique(direction.ravel() * (len(p.tools) + 1) + p.tool[first][fixed], return_inverse=True)
     floor = np.full(len(start), -np.inf)
     least = np.full(int(group.max(initial=-1)) + 1, np.inf)
-    np.minimum.at(least, group.ravel(), lowest[fixed])
+    np.fmin.at(least, group.ravel(), lowest[fixed])
     floor[fixed] = least[group.ravel()]
     last = np.zeros(len(cut), dtype=np.bool_)
     last[np.maximum(first - 1, 0)] = True

@@ -105,15 +105,15 @@ def compare(code: Canonical, motion: Motion, job: Job, executed: BlockPoses, gco
     job = job.with_moves(split_as_written(motion, executed, job, ends, grain))
     moves = job.moves.without_pecks()
     match, owner = aligned(ends, moves, moves.link, tolerance, axis_tolerance, grain)
-    lost = unreached(match)
-    diagnostics = [] if lost < 0 else [_not_reached(motion, moves, match, lost, faults)]
-    bound = bound_of_blocks(motion, executed, moves, owner, (tolerance, axis_tolerance), job.corrects, ends=(tip, axis))
+    lost, allowed = unreached(match), (tolerance, axis_tolerance)
+    diagnostics = [] if lost < 0 else [_not_reached(motion, moves, match, lost, (tip, axis), allowed, faults)]
+    bound = bound_of_blocks(motion, executed, moves, owner, allowed, job.corrects, ends=(tip, axis))
     (worst_tip, tip_line), (worst_axis, axis_line) = _farthest(motion, executed, moves, tip, axis, match, owner, tolerance,
                                                                None if job.corrects else bound.whole)
     diagnostics += _beyond("tip", "mm", worst_tip, tolerance, tip_line, faults)
     diagnostics += _beyond("axis", "degrees", worst_axis / DEG, axis_tolerance / DEG, axis_line, faults)
     if not has_errors(diagnostics):
-        diagnostics += _unproved(bound, (tolerance, axis_tolerance), moves, motion, owner, faults)
+        diagnostics += _unproved(bound, allowed, moves, motion, owner, faults)
     if bound.unbounded and job.options.require_proof:
         diagnostics.append(faults.error("verify.no_bound", f"{bound.unbounded} of {len(motion)} blocks have no bound of "
                                         "their deviation, they are only checked at places", int(moves.line[0]),
@@ -243,9 +243,19 @@ def _known_limits(most: Floats, arc: Bools, tolerance: float) -> Floats:
     return np.where(arc | ~(most[0] < tolerance) | np.isnan(most[1]), np.inf, most)
 
 
-def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: int, faults: Faults) -> Diagnostic:
+def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: int, ends: tuple[Floats, Floats],
+                 allowed: tuple[float, float], faults: Faults) -> Diagnostic:
+    """No block ends at a point of the CL file; or one behind the point before has its tip there, and not its axis."""
     x, y, z = moves.tip[lost]
-    last = int(motion.line[match[lost - 1]]) if lost else int(motion.line[0])
+    at = int(match[lost - 1]) if lost else 0
+    last = int(motion.line[at])
+    there = at + np.flatnonzero(lengths(ends[0][at:] - moves.tip[lost]) <= allowed[0])
+    tilted = angle_between(ends[1][there], np.tile(moves.axis[lost], (len(there), 1)))
+    if len(there) and tilted.min() > allowed[1]:
+        return faults.error("verify.axis", f"the program comes to the point ({x:.4f}, {y:.4f}, {z:.4f}) mm of the table "
+                            f"frame with a tool axis that is off by {tilted.min() / DEG:.6f} degrees, allowed "
+                            f"{allowed[1] / DEG:g} degrees", int(moves.line[lost]), int(motion.line[there[tilted.argmin()]]),
+                            hint="do not run this program")
     return faults.error("verify.not_reached", f"the program never comes to the point ({x:.4f}, {y:.4f}, {z:.4f}) mm of the "
                         "table frame", int(moves.line[lost]), last, hint="a block behind this line is missing or wrong, or "
                         "the program is not made from this CL file with this machine, set-up and tools")

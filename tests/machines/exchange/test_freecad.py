@@ -71,8 +71,7 @@ def test_of_two_rotary_axes_the_file_does_not_say_which_carries_the_other(tmp_pa
 def test_what_is_wrong_is_said(tmp_path: Path) -> None:
     assert "ERROR import.number" in imported(tmp_path, mill() | {"X": {"limits": {"min": "far"}}})[1]
     assert "ERROR import.geometry" in imported(tmp_path, mill(S=A))[1]
-    (tmp_path / "kinematic.ini").write_text("CfgKinSimpleTrans")
-    assert import_machine(tmp_path / "kinematic.ini", "auto", ())[2][0].code == "import.format"
+    assert "ERROR import.travel" in imported(tmp_path, mill(A=A | {"limits": {"min": -90.0}}))[1]
 
 
 def test_all_that_the_file_does_not_say_comes_at_once(tmp_path: Path) -> None:

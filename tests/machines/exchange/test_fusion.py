@@ -90,7 +90,12 @@ def test_what_no_speed_and_no_end_state_is_assumed(tmp_path: Path) -> None:
     """Speed 0 is none; a linear axis without ends has assumed ones, a rotary one turns without end."""
     file = trunnion()
     file["controller"]["default"]["parts"]["Y"]["max_rapid_speed"] = 0
-    del file["kinematics"]["default"]["parts"][2]["min"]
+    y, b = file["kinematics"]["default"]["parts"][2], file["kinematics"]["default"]["parts"][1]["parts"][0]
+    ends = [(part, part.pop("min")) for part in (y, b)]
+    assert [line[:19] for line in imported(tmp_path, file)[1] if "travel only" in line] == 2 * ["ERROR import.travel"], (
+        "the other end was dropped, and B turned without end")
+    b["min"] = ends[1][1]
+    del y["max"]
     machine, found = imported(tmp_path, file, "m.machine")
     assert machine is not None and "axes.Y.travel" in found[-1] and "axes.Y.velocity" in found[-1]
 

@@ -66,6 +66,7 @@ def test_of_two_in_the_head_u_carries_v(tmp_path: Path) -> None:
     ("</machine>", "", "no XML that is read"),
     ("<machine xmlns", '<!DOCTYPE m [<!ENTITY a "b">]>\n<machine xmlns', "entities of its own"),
     ('axis="0 1 0" coordinate="Y"', 'coordinate="Y"', "axis B has no direction"),
+    ('range="-35deg 120deg"', 'range="-35deg"', "not two ends"),
 ])
 def test_what_is_not_read_is_said_with_its_reason(tmp_path: Path, old: str, new: str, says: str) -> None:
     assert old in FILE

@@ -140,8 +140,11 @@ def test_what_the_header_of_a_program_states_gives_the_machine_back(name: str, r
 
 
 @pytest.mark.parametrize(("old", "new", "code"), [
-    ("TRAFO_TYPE_1=40", "TRAFO_TYPE_1=49", "ERROR import.geometry 0"),
-    ("TRAFO_TYPE_1=40", "TRAFO_TYPE_1=49", "WARNING import.kinematics 20"),
+    ("TRAFO_TYPE_1=40", "TRAFO_TYPE_1=49", "ERROR import.kinematics 20"),
+    ("N24100 $MC_TRAFO_TYPE_1=40", '$NK_NAME[0]="ROOT"', "ERROR import.kinematics 20"),
+    ("[2]=-600", "[2]=-600,5", "ERROR import.number 29"),
+    ("[0]=-1", "[0]=one", "ERROR import.number 21"),
+    ("$MC_TRAFO5_BASE_TOOL_1[2]=-600\n", "", "WARNING import.default 20"),
     ("TRAFO_TYPE_1=40", "TRAFO_TYPE_1=33", "INFO import.sense 20"),
     ("N24100", "$MC_TRAFO5_ROT_AX_OFFSET_1[0]=90\nN24100", "ERROR import.kinematics 20"),
     ("N24100", "$MC_TRAFO5_ROT_SIGN_IS_PLUS_1[1]=0\nN24100", "ERROR import.kinematics 20"),
@@ -157,7 +160,24 @@ def test_what_the_header_of_a_program_states_gives_the_machine_back(name: str, r
     ("N24100", '$TC_CARR23[1]="P"\n$TC_CARR7[1]=-1\n$TC_CARR46[1]=0.004\nN24100', "WARNING import.fine 22"),
 ])
 def test_what_is_wrong_is_said_with_its_line(old: str, new: str, code: str, tmp_path: Path) -> None:
-    assert code in imported(tmp_path, AC + TABLE.replace(old, new, 1))[1]
+    found = imported(tmp_path, AC + TABLE.replace(old, new, 1))[1]
+    assert code in found
+    assert sum(one.startswith("ERROR") for one in found) <= max(1, new.count("=")), "one cause, one line"
+
+
+def test_a_file_cut_off_before_its_vectors_has_no_axes_at_the_zero(tmp_path: Path) -> None:
+    assert imported(tmp_path, AC + TABLE[:TABLE.index("$MC_TRAFO5_BASE")])[1] == ["ERROR import.geometry 20"]
+
+
+def test_other_ways_to_write_the_same(tmp_path: Path) -> None:
+    """Several assignments in a line, small letters, TRUE and FALSE for 1 and 0."""
+    plain = imported(tmp_path, "$MN_SCALING_SYSTEM_IS_METRIC=0\n" + AC + TABLE + FIGURES)[0]
+    one_line = TABLE.replace("\n$MC_TRAFO5_BASE", " $MC_TRAFO5_BASE").replace("=1\n", "=TRUE\n")
+    other = imported(tmp_path, "$MN_SCALING_SYSTEM_IS_METRIC=FALSE\n" + (AC + one_line).replace("$MC", "$mc")
+                     + FIGURES.replace("MODULO[AX6]=1", "MODULO[ax6]=TRUE"))[0]
+    assert plain is not None and other is not None and plain.turns == other.turns
+    for mine, theirs in zip(plain.kinematics.chain, other.kinematics.chain, strict=True):
+        np.testing.assert_array_equal([mine.point, mine.direction], [theirs.point, theirs.direction])
 
 
 def test_older_types_have_axes_along_their_letters(tmp_path: Path) -> None:
@@ -180,10 +200,6 @@ def test_older_types_have_axes_along_their_letters(tmp_path: Path) -> None:
 def test_other_channels_are_left_out(tmp_path: Path) -> None:
     machine = imported(tmp_path, AC + TABLE + "CHANDATA(2)\nN24100 $MC_TRAFO_TYPE_1=24\n")[0]
     assert machine is not None and machine.structure == "w C' A' b X Y Z (C1) t"
-
-
-def test_kinematics_of_a_tnc_are_refused_in_one_line(tmp_path: Path) -> None:
-    assert imported(tmp_path, "CfgKinSimpleAxis (key:=\"A\")\n") == (None, ["ERROR import.format 0"])
 
 
 def test_a_transformation_that_lacks_an_axis_is_one_fault(tmp_path: Path) -> None:

@@ -297,6 +297,8 @@ def test_pivots_of_each_control() -> None:
         points, wrong = points_of(form, ("B", "C"), (), {name: tuple(v) for name, v in given.items()})
         assert wrong == [], form
         np.testing.assert_allclose([points["B"], points["C"]], [b, c])
+    points, wrong = points_of("heidenhain", ("C",), ("B",), {"Trans 1": tuple(b), "Trans 2": tuple(c - b)})
+    np.testing.assert_allclose([points["B"], points["C"]], [b, c], err_msg="one sequence, from the tool on")
     points, wrong = points_of("haas", ("B", "C"), (), {"MRZP": tuple(b)})
     np.testing.assert_allclose([points["B"], points["C"]], [b, b])
 

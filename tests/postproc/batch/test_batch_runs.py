@@ -6,6 +6,7 @@ import csv
 import io
 import json
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -156,3 +157,14 @@ def test_texts_of_files_do_no_harm_in_the_index(tmp_path: Path) -> None:
     assert "<script>" not in page and "<img>" not in page and "<b>" not in page and "&lt;script&gt;" in page
     cells = next(iter(csv.DictReader(io.StringIO(as_csv([{**rows[0], "job": "=1+1"}])))))
     assert cells["job"] == "'=1+1" and cells["messages"].startswith("'=HYPERLINK") and cells["outcome"] == "refused"
+
+
+def test_commands_in_threads_of_one_worker_keep_their_messages_apart(tmp_path: Path) -> None:
+    """A worker that is begun without --nthreads 1 has a thread for each core; streams are the process's."""
+    def said(number: int) -> Ran:
+        return command.run_command(["inspect", str(tmp_path / f"{number}.cls")])
+
+    with ThreadPoolExecutor(4) as threads:
+        found = list(threads.map(said, range(12)))
+    for number, ran in enumerate(found):
+        assert ran.code == 1 and len(ran.said) == 1 and f"{number}.cls" in ran.said[0], (number, ran)

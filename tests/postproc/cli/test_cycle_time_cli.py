@@ -16,7 +16,7 @@ from tests.postproc.time_kit import blocks, model
 
 PROGRAM = "G21 G90 G94 G17 G64 P0.01\nG0 X0 Y0 Z300\nF3000\n" + "\n".join(
     f"G1 X{(i * i) % 17} Y{(3 * i) % 23 + i}" + f" F{1500 + 700 * (i % 5)}" * (i % 9 == 0)
-    for i in range(1, 50)) + "\nG0 Z350\nM2\n"
+    for i in range(1, 32)) + "\nG0 Z350\nM2\n"
 
 
 def call(*words: object) -> Result:

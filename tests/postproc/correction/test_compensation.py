@@ -26,7 +26,8 @@ from postproc.correction.reversals import LOOSE
 from postproc.pipeline.convert import verify
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import load_setup
-from tests.postproc.kit import few_sides
+from tests.postproc.kit import codes, convert, few_sides, good, setup_of, toolpath
+from toolpaths.diagnostics import Severity
 from toolpaths.units import DEG
 
 SAMPLES = Path("samples")
@@ -292,3 +293,18 @@ def test_command_line_convert_verify_trace(tmp_path: Path) -> None:
 def test_models_of_other_machines_are_refused() -> None:
     assert not converted("five_faces.cls", "trunnion-bc", model=MIKRON).ok
     assert ErrorModel(SerialErrors()).names == []
+
+
+def test_a_tilt_that_no_axis_turns_back_is_said_and_a_tolerance_decides(tmp_path: Path) -> None:
+    """The tip is corrected; of the axis post and `verify` say by how much it is off, not that points are missing."""
+    model = written(tmp_path, ErrorModel(SerialErrors(constants={"EB0S": 600.0 * DEG / 3600.0})))
+    path = toolpath("LOADTL/1", "SPINDL/RPM,800,CLW", "RAPID", "GOTO/0,0,5", "FEDRAT/MMPM,1500", "GOTO/0,0,0", "GOTO/4,0,0")
+    setup = setup_of("[tools.1]\ngauge_length = 80\n")
+    refused = convert(path, "mill-3axis", setup=setup, error_model=model)
+    assert [d.code for d in refused.diagnostics if d.severity is Severity.ERROR] == ["compensation.axis"]
+    result = good(convert(path, "mill-3axis", setup=setup, error_model=model, axis_tolerance=0.19))
+    assert result.comparison is not None and result.comparison.axis_bound == pytest.approx(600.0 * DEG / 3600.0)
+    assert result.comparison.tip_bound < result.options.tolerance
+    (tmp_path / "a.ngc").write_text(result.text)
+    seen = verify(tmp_path / "a.ngc", path, "mill-3axis", "linuxcnc", setup, Options(error_model=model))
+    assert "verify.axis" in codes(seen.diagnostics) and "verify.not_reached" not in codes(seen.diagnostics)

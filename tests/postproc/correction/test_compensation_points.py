@@ -47,7 +47,8 @@ TWO = (0, 1)
 def converted(sample: str, machine: str, controller: str, setup: str) -> PostResult:
     options = Options(setup=str(SAMPLES / f"{setup}.setup.toml"),
                       error_model=str(SAMPLES / f"errors/{machine}.toml"))
-    return postproc.convert(few_sides(sample, (0, 4, 5) if "h4a" in sample else None), machine, controller, options=options)
+    sides = (0, 4, 5) if "h4a" in sample else (0, 1) if sample == "five_faces.cls" else None
+    return postproc.convert(few_sides(sample, sides), machine, controller, options=options)
 
 
 @pytest.mark.covering(of=("machine",))

@@ -76,6 +76,16 @@ def test_no_model_is_faster_than_the_bound() -> None:
             assert lower_bound(b, m) <= total(b, timed(b, m)) * (1.0 + 1e-9), (name, kind)
 
 
+@pytest.mark.parametrize("kind", ["control", "fanuc"])
+def test_no_executed_control_is_faster_than_its_bound(kind: str) -> None:
+    """With jerk, and its rests; formulas of it take no less either."""
+    m = model(kind)
+    for name, b in programs(4):
+        assert lower_bound(b, m) <= total(b, timed(b, m.quick())), name
+    for name, b in programs(1):
+        assert lower_bound(b, m) <= total(b, timed(b, m)), name
+
+
 def test_bound_is_the_ramp_from_rest_to_rest_between_forced_stops() -> None:
     """Two collinear lines with a dwell between: rest at both ends and in the middle, corners free."""
     b = blocks(f"{HEAD}\nF6000\nG1 X30\nG1 X60\nG4 P0.5\nG1 X90 Y30")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile
+from postproc.verification.read_back import read_back
 from tests.postproc.kit import (
     Step,
     angle,
@@ -138,8 +140,9 @@ def test_leaves_and_comes_along_the_tool_axis() -> None:
 
 
 def test_distance_of_the_setup_is_where_the_tool_leaves_to() -> None:
-    """distance 120 from the stated centre: every retract ends at least that high along its axis."""
-    setup = SetupFile.model_validate({"clearance": {"centre": (0, 0, 0), "distance": 120.0},
+    """distance 100 from the stated centre: every retract ends at least that high along its axis, and `verify` misses what a
+    greater one would ask for."""
+    setup = SetupFile.model_validate({"clearance": {"centre": (0, 0, 0), "distance": 100.0},
                                       "tools": tool_setup().model_dump()["tools"]})
     a, b = tilted(70, 10), tilted(60, 130)
     path = toolpath("RAPID", *goto([45 * a], [a]), *goto([40 * a], [a]), "RAPID", *goto([45 * b], [b]),
@@ -151,7 +154,17 @@ def test_distance_of_the_setup_is_where_the_tool_leaves_to() -> None:
         for i in [i for i, s in enumerate(steps) if s.kind != "rapid"]:
             axis = poses[i][1][-1]
             level = [tip[-1] @ axis for tip, ax in poses[i + 1:i + 3] if angle(ax[-1:], axis[None])[0] < 1e-4]
-            assert max(level) > 119.9
+            assert max(level) > 99.9
+        assert not found_under(result, distance=100.0) and not found_under(result, distance=None, margin=50.0)
+        for asked in ({"distance": 125.0}, {"distance": None, "margin": 1250.0}):  # of a margin a tenth at least
+            assert found_under(result, **asked) == {"verify.safe_plane"}
+
+
+def found_under(result: PostResult, **clearance: float | None) -> set[str]:
+    """What `verify` says of a program under a set-up with other safe distances."""
+    assert result.job is not None
+    setup = result.setup.model_copy(update={"clearance": result.setup.clearance.model_copy(update=clearance)})
+    return codes(read_back(result.text, replace(result.job, setup=setup), "test.apt", gcode="p.nc")[1])
 
 
 def test_tool_is_changed_at_home_only() -> None:

@@ -51,6 +51,8 @@ def test_a_share_of_the_tolerance_that_gains_is_stated_and_verified(tmp_path: Pa
     best = made("linuxcnc", optimise=True)
     assert best.ok and best.optimised is not None
     assert best.optimised.steps and any("smoothing" in one.what for one in best.optimised.steps)
+    assert best.optimised.before.bound < best.optimised.least <= best.optimised.after.seconds
+    assert best.optimised.closed is not None and best.optimised.closed > 100.0 / 3.0
     stated = read_header(best.text.encode()).smoothing
     assert stated == best.options.smoothing > 0.0
     program = tmp_path / "p.ngc"
@@ -72,6 +74,15 @@ def test_a_header_that_gives_the_control_what_the_path_has_used_is_refused(tmp_p
     program.write_text(text)
     found = verify(program, swing(), machine("mikron-ucp710"), "linuxcnc")
     assert "verify.smoothing" in {d.code for d in found.diagnostics} and not found.ok
+
+
+def test_a_tolerance_that_is_used_up_takes_fewer_blocks_and_is_kept() -> None:
+    plain, filled = made("generic-iso"), made("generic-iso", filled=True)
+    assert filled.ok and plain.path is not None and filled.path is not None and len(filled.path) < len(plain.path)
+    assert plain.comparison is not None and filled.comparison is not None
+    assert plain.comparison.tip_bound < filled.comparison.tip_bound <= 0.01
+    assert "tolerance used up" in filled.text and "tolerance used up" not in plain.text
+    assert program_clock().ranked(filled).seconds == program_clock().executed(filled).seconds
 
 
 def test_what_is_slower_is_not_taken() -> None:

@@ -140,18 +140,37 @@ def said_by(text: str) -> list[str]:
     return [block.lstrip("0123456789 ") for block in text.splitlines() if "(" not in block and ";" not in block]
 
 
-def test_a_tool_that_is_never_loaded_is_not_numbered() -> None:
-    second = TWO.rindex("LOAD/TOOL,0\n")
-    found = said(converted(TWO[:second] + TWO[second + 12:], of=setup(tool_numbers=NAMES)), "tool.not_loaded")
-    assert "EM6 (T2)" in found.message
+BACK = TWO + TWO.split("END-OF-PATH\n")[0] + "END-OF-PATH\n"
+"""the first tool again after the second"""
 
 
-def test_a_tool_that_is_never_loaded_is_said_with_the_numbers_that_are_missing() -> None:
-    """It came in the second run, when the set-up had numbered the tools."""
-    second = TWO.rindex("LOAD/TOOL,0\n")
-    result = converted((TWO[:second] + TWO[second + 12:]).replace("FEDRAT", "$$ FEDRAT"))
-    assert {"tool.number", "tool.not_loaded", "feed.missing"} <= {d.code for d in result.diagnostics}
-    assert "tool.not_loaded" not in {d.code for d in converted(TWO).diagnostics}
+@pytest.mark.parametrize("first", ["LOAD/TOOL,0", "LOAD/TOOL,7"])
+def test_tools_that_the_set_up_numbers_are_called_where_the_file_loads_the_first_alone(first: str) -> None:
+    """It was refused, though the hint of tools of one number asks for these lines of a set-up."""
+    head, *rest = BACK.split("LOAD/TOOL,0\n")
+    result = converted(head + first + "\n" + "".join(rest), of=setup(tool_numbers=NAMES))
+    assert not errors(result) and said_by(result.text) == said_by(converted(BACK, of=setup(tool_numbers=NAMES)).text)
+    loads = [e.values[0] for e in result.job.toolpath.events if e.word == "LOADTL"] if result.job else []
+    assert loads == [1.0, 2.0, 1.0]
+
+
+NUMBERED = "UNITS/MM\nSPINDL/RPM,900,CLW\nFEDRAT/MMPM,400\n" + "".join(
+    f"TOOLNO/{n},MILL,{size},0\n{load}{CUT}" for n, size, load in ((1, 12, "LOADTL/1\n"), (2, 6, "")))
+"""a record numbers the second tool, none loads it"""
+
+
+def test_a_tool_that_the_file_numbers_and_never_loads_is_refused() -> None:
+    found = said(converted(NUMBERED), "tool.not_loaded")
+    assert "(T2)" in found.message and converted(NUMBERED.replace("MILL,6,0\n", "MILL,6,0\nLOADTL/2\n")).ok
+
+
+@pytest.mark.parametrize(("controller", "written"), [("haas-ngc", "T0\n"), ("heidenhain-tnc640", "TOOL DEF 0\n")])
+def test_an_empty_place_is_not_made_ready_before_a_tool(controller: str, written: str) -> None:
+    """SELECT/TOOL,0 was written as T0, which takes the tool out of the spindle where a word T calls it at once."""
+    text = f"UNITS/MM\nSPINDL/900,RPM,CLW\nFEDRAT/400\nLOADTL/1\nSELECT/TOOL,0\n{CUT}LOADTL/2\nSPINDL/900,RPM,CLW\n{CUT}"
+    assert written not in converted(text, controller=controller).text
+    assert written.replace("0", "2") in converted(text.replace("TOOL,0", "TOOL,2"), controller=controller).text
+    assert written in converted(text + "SELECT/TOOL,0\nGOHOME\nLOADTL/0\n", controller=controller).text
 
 
 def test_names_that_the_file_does_not_have_are_reported() -> None:

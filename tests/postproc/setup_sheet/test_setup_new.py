@@ -411,9 +411,9 @@ def test_the_unit_of_a_file_that_states_none_is_asked_for(tmp_path: Path, monkey
 
 def test_nobody_is_asked_for_what_no_answer_puts_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Numbers and speeds were asked for, then the file was refused for a tool that it never loads."""
-    text = "UNITS/MM\nTOOL PATH/A,TOOL,T1\nLOAD/TOOL,0\nRAPID\nGOTO/0,0,9\nGOTO/9,0,0\nEND-OF-PATH\n"
-    other = text.partition("\n")[2].replace("T1", "T2").replace("LOAD/TOOL,0\n", "")
-    (file := tmp_path / "part.cls").write_text(text + other)
+    cut = "RAPID\nGOTO/0,0,9\nGOTO/9,0,0\n"
+    (file := tmp_path / "part.cls").write_text(
+        f"UNITS/MM\nTPRINT/T1\nLOADTL/0\n{cut}TOOLNO/7,MILL,10,0\n{cut}TOOLNO/8,MILL,6,0\n{cut}LOADTL/7\n{cut}FINI\n")
     said = run("setup", "new", file, "-m", "mill-3axis", "-o", tmp_path / "s.toml", stdin="1\n2\n", code=1)
     assert "tool.not_loaded" in said.stderr and "number in the magazine" not in said.output
 

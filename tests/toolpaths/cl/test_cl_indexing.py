@@ -90,6 +90,38 @@ def test_files_that_contradict_themselves_are_refused(old: str, new: str, code: 
     assert found.lines and found.hint
 
 
+TURNS = """\
+$$-> MFGNO / X
+UNITS / MM
+FEDRAT / 100, MMPM
+ROTATE / AAXIS, {0}-30.0, {2}
+RAPID
+GOTO / 0.0, 0.0, 50.0
+GOTO / 9.0, 0.0, 40.0
+ROTATE / AAXIS, {1}, {2}
+{3}RAPID
+GOTO / 0.0, 0.0, 50.0
+FINI
+"""
+REMARK = "$$-> CSYS / 1.0, 0.0, 0.0, 0.0, $\n0.0, 0.258819045, -0.965925826, 0.0, $\n0.0, 0.965925826, 0.258819045, 0.0\n"
+
+WRONG = REMARK.replace("-0.9", "@").replace("0.9", "-0.9").replace("@", "0.9")
+
+
+@pytest.mark.parametrize(("word", "angle", "sense", "remark", "code"), [
+    ("INCR, ", "INCR, -45.0", "CCLW", "", ""), ("ABS, ", "ABS, -75.0", "CCLW", "", ""),
+    ("ATANGL, ", "ATANGL, -75.0", "CCLW", "", ""), ("", "INCR, -45.0", "CCLW", "", ""), ("", "-45.0", "CCLW", REMARK, ""),
+    ("", "-45.0", "CCLW", "", "cl.index-frame"), ("ABS, ", "ABS, 75.0", "CLW", "", "cl.index-frame"),
+    ("ABS, ", "ABS, -75.0", "CCLW", WRONG, "cl.index-frame")])
+def test_an_angle_adds_to_that_of_the_table_or_states_it(word: str, angle: str, sense: str, remark: str, code: str) -> None:
+    """ABS was added to the angle before: every cut behind the second was turned, and nothing was said."""
+    result = read_bytes(TURNS.format(word, angle, sense, remark))
+    assert errors(result)[:1] == [code] * bool(code)
+    if not code:
+        t = np.radians(75.0)
+        assert np.abs(result.toolpath.tip[-1] - [0.0, -50.0 * np.sin(t), 50.0 * np.cos(t)]).max() < 1e-6
+
+
 def test_axes_of_a_subroutine_that_are_radial_already_are_refused() -> None:
     old = "-4.0000000000, $\n 0.0000000000, 0.0000000000, 1.0000000000"
     assert "cl.index-axis" in errors(path_of(m.SpellingOptions(multax=True), (
