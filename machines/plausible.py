@@ -155,7 +155,7 @@ def _turning(machine: Machine, known: Bools) -> Iterator[KeyProblem]:
 
 
 def _pivots(machine: Machine, odd: set[KeyPath]) -> Iterator[KeyProblem]:
-    """Pivots that no machine has; slides of odd travel tell nothing about them."""
+    """Pivots that no machine has; slides of odd travel say nothing about them."""
     carried = machine.structure.split()
     turns = [joint for joint in machine.kinematics.chain if joint.rotary]
     tables = [joint for joint in turns if f"{joint.name}'" in carried]

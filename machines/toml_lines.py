@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -155,3 +156,17 @@ class _Scanner:
                 self.at += 1
                 self._blank()
         self.at += 1
+
+
+def dotted(path: Sequence[str | int]) -> str:
+    """("axes", 0, "name") as axes[0].name"""
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text
+
+
+def table_named(path: KeyPath) -> str:
+    """("axes", "X") as [axes.X], ("places", 0) as table 1 of places: one of a list has no name that a file could hold."""
+    last = path[-1]
+    return f"table {last + 1} of {dotted(path[:-1])}" if isinstance(last, int) else f"[{dotted(path)}]"

@@ -18,7 +18,7 @@ from typing import Any, TypeVar, get_args, get_origin
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from machines.toml_lines import KEPT, SHORT, KeyPath, Values, own_copy, parsed
+from machines.toml_lines import KEPT, SHORT, KeyPath, Values, dotted, own_copy, parsed, table_named
 from machines.user_model import SCHEMA_KEY, key_texts
 from machines.value_words import POINT, advice, allowed, decimal_comma
 from toolpaths.cl.text.kinds_of_file import what_is
@@ -117,7 +117,9 @@ def validate(file: UserFile, model: type[M]) -> tuple[M | None, list[Diagnostic]
     try:
         return model.model_validate_json(text), []
     except ValidationError as found:
-        return None, [_diagnostic(file, model, fault) for fault in _faults(file.values, model, found)]
+        faults = _faults(file.values, model, found)
+        there = [_diagnostic(file, model, fault) for fault in faults if fault.kind != "missing"]
+        return None, sorted([*there, *_missing(file, model, faults)], key=lambda d: (d.file != file.file, d.lines))
 
 
 def wrong_keys(file: UserFile, model: type[BaseModel]) -> list[KeyPath]:
@@ -197,8 +199,8 @@ def _text(path: FilePath, source: str, builtin: Mapping[str, FilePath], kind: st
         return read_input(path).decode("utf-8-sig").replace("\r\n", "\n"), None
     except FileNotFoundError:
         what = f"no {kind} is called {source!r}" + ("" if source in builtin else " and there is no such file")
-        return None, error("file.not-found", what, file=file, lines=lines,
-                           hint=nearest(source.removesuffix(".toml"), sorted(builtin)))
+        return None, error("file.not-found", what if builtin else f"there is no file {shown(path)}", file=file, lines=lines,
+                           hint=nearest(source.removesuffix(".toml"), sorted(builtin)) or f"name the file of the {kind}")
     except OSError as fault:
         return None, error("file.unreadable", f"cannot read {shown(path)}: {reason(fault)}", file=file, lines=lines,
                            hint=remedy(fault, f"name a TOML file of a {kind}"))
@@ -256,8 +258,8 @@ def _merge(under: Values, over: Values, under_at: Mapping[KeyPath, ValueSource],
 # ---- faults of the values ----------------------------------------------------------------------------------
 
 _CODES = {"value_error": "file.value", "assertion_error": "file.value"}
-_RANGE = ("greater_than", "less_than", "too_short", "too_long", "multiple_of", "finite_number", "literal_error", "enum",
-          "pattern_mismatch")
+_RANGE = ("greater_than", "less_than", "elements", "too_short", "too_long", "multiple_of", "finite_number", "literal_error",
+          "enum", "pattern_mismatch")
 
 
 @dataclass(frozen=True)
@@ -279,8 +281,9 @@ def _faults(values: Values, model: type[BaseModel], found: ValidationError) -> l
         path, kind = _in_file(values, detail), detail["type"]
         context = detail.get("ctx", {})
         message = str(context.get("error", detail["msg"]))
-        if kind == "missing" and isinstance(path[-1], int):
-            kind, context, path = "too_short", {"min_length": path[-1] + 1}, path[:-1]
+        if kind == "missing" and isinstance(path[-1], int):  # the last one that is missing says how many there are
+            kind, context, path = "elements", {"count": path[-1] + 1}, path[:-1]
+            by_key.pop(path, None)
         words = allowed(kind, context)
         message = f"allowed: {words}" if words else message[:1].lower() + message[1:]
         hint = getattr(context.get("error"), "hint", "") or advice(kind, detail["input"])
@@ -315,13 +318,21 @@ def _diagnostic(file: UserFile, model: type[BaseModel], fault: _Fault) -> Diagno
         elsewhere = getattr(model, "ELSEWHERE", {}).get(key)
         return file.problem("file.unknown-key", path, f"unknown key {key!r}",
                             elsewhere or nearest(str(path[-1]), _known_keys(model, path[:-1])))
-    if fault.kind == "missing":
-        return file.problem("file.missing-key", path, f"key {key!r} is missing", _added(model, path))
     if code:
         return file.problem(code, path, f"{key}: {fault.message}" if key else fault.message, fault.hint)
     code = "file.range" if any(word in fault.kind for word in _RANGE) else "file.type"
     hint = _described(model, path) if fault.kind == "string_pattern_mismatch" else fault.hint
     return file.problem(code, path, f"{key} = {_shown(fault.value)}: {fault.message}", hint)
+
+
+def _missing(file: UserFile, model: type[BaseModel], faults: list[_Fault]) -> list[Diagnostic]:
+    """What is missing of each table, as one."""
+    tables: dict[KeyPath, list[KeyPath]] = {}
+    for path in (fault.path for fault in faults if fault.kind == "missing"):
+        tables.setdefault(path[:-1], []).append(path)
+    return [file.problem("file.missing-key", paths[0], f"key {dotted(paths[0])!r} is missing" if len(paths) == 1 else
+                         f"keys {', '.join(repr(dotted(path)) for path in paths)} are missing",
+                         "; ".join(_added(model, path) for path in paths)) for paths in tables.values()]
 
 
 def _added(model: type[BaseModel], path: KeyPath) -> str:
@@ -330,7 +341,7 @@ def _added(model: type[BaseModel], path: KeyPath) -> str:
         m.model_fields[name].is_required() for m in _tables(model, path) if name in m.model_fields)]
     if needed:
         return f"add a table [{dotted(path)}] with {', '.join(f'{name} = ...' for name in needed)}"
-    where = f"to [{dotted(path[:-1])}]" if path[1:] else "at the top"
+    where = f"to {table_named(path[:-1])}" if path[1:] else "at the top"
     return f"add {path[-1]} = ... {where}"
 
 
@@ -350,14 +361,6 @@ def _described(model: type[BaseModel], path: Sequence[str | int]) -> str:
         said = [key_texts(m).get(str(part), "") for kind in found for m in _models(kind)]
         text = next((" ".join(one.split()) for one in said if one), text)
         found = [inner for kind in found for inner in _inside(kind, part)]
-    return text
-
-
-def dotted(path: Sequence[str | int]) -> str:
-    """("axes", 0, "name") as axes[0].name"""
-    text = ""
-    for part in path:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
     return text
 
 

@@ -13,7 +13,8 @@ _ALLOWED = {
     "finite_number": "a finite number", "literal_error": "{expected}",
     "greater_than": "more than {gt:g}", "greater_than_equal": "{ge:g} or more",
     "less_than": "less than {lt:g}", "less_than_equal": "{le:g} or less",
-    "too_short": "{min_length} elements or more", "too_long": "{max_length} elements or fewer",
+    "elements": "{count} elements", "too_short": "{min_length} elements or more",
+    "too_long": "{max_length} elements or fewer",
     "string_too_short": "text of length {min_length} or more", "string_too_long": "text of length {max_length} or less",
     "string_pattern_mismatch": "text of the form {pattern}"}
 _NUMBER = re.compile(r"\s*[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?\s*$")

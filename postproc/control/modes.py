@@ -15,7 +15,7 @@ from postproc.control.control import Control, InterpolationMode, tool_frames
 from postproc.control.planes import Plane, stated
 from postproc.controllers.model import ControllerFile
 from postproc.controllers.output_modes import Mode
-from postproc.setup.model import SetupFile
+from postproc.setup.model import SetupFile, line_of
 from toolpaths.arrays import Array, Floats, Ints, distinct
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
@@ -237,14 +237,16 @@ def _no_subprograms(controller: ControllerFile, setup: SetupFile, options: Optio
     key = "files" if setup.output.files else "subprograms"
     table = "subprogram_files" if setup.output.files else "subprograms"
     return [error("output.subprograms", f"[output] {key}: the controller has none ([{table}] of its file)",
-                  file=options.setup, hint="restart = true begins every operation afresh in one program")]
+                  file=options.setup, lines=line_of(options.setup, ("output", key)),
+                  hint="restart = true begins every operation afresh in one program")]
 
 
 def _unknown_operations(setup: SetupFile, options: Options, toolpath: Toolpath) -> list[Diagnostic]:
     names = {op.name for op in toolpath.operations}
     known = ", ".join(sorted(n for n in names if n)) or "no named operation"
     return [error("setup.operation", f"[output.operations] names {name!r}, which is not an operation of the CL file",
-                  file=options.setup, hint=f"it has: {known}")
+                  file=options.setup, lines=line_of(options.setup, ("output", "operations", name)),
+                  hint=f"it has: {known}")
             for name in setup.output.operations if name not in names]
 
 

@@ -349,8 +349,8 @@ def _refused(toolpath: Toolpath) -> list[Diagnostic]:
         named = ", ".join(op.name or (f"the operation in line {op.line}" if op.line else "all of it") for op in turning[:3])
         whole = "this is a turning file" if len(turning) == len(toolpath.operations) else "turning stands between milling"
         result.append(error("convert.turning", f"{whole} ({named}): milling alone is converted", file=toolpath.file,
-                            lines=[op.line for op in turning][:6], count=len(turning),
-                            hint="take turning operations out of the CL file; inspect reads them"))
+                            lines=[op.line for op in turning][:6], count=len(turning), hint="take turning operations out of "
+                            "the CL file; inspect reads them; a surface speed (SFM, SMM) of a mill is stated by RPM"))
     if not bool((toolpath.role != Role.START).any()):
         result.append(error("convert.no_motion", "the file commands no motion", file=toolpath.file,
                             hint="it needs GOTO records"))

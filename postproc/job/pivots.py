@@ -7,7 +7,7 @@ import numpy as np
 from machines.kinematics.base import Kinematics
 from machines.machine import Machine
 from postproc.base.options import Options
-from postproc.setup.model import SetupFile
+from postproc.setup.model import SetupFile, line_of
 from toolpaths.diagnostics import Diagnostic, error
 
 ALLOWED = 0.1
@@ -37,7 +37,8 @@ def control_kinematics(machine: Machine, setup: SetupFile,
     unknown = [k for k in setup.control_pivots if k not in letters]
     if not letters or unknown:
         return None, [error("setup.pivot", f"[control_pivots.{k}]: {machine.name} has no such rotary axis",
-                            file=options.setup, hint=f"its rotary axes are {', '.join(letters) or 'none'}")
+                            file=options.setup, lines=line_of(options.setup, ("control_pivots", k)),
+                            hint=f"its rotary axes are {', '.join(letters) or 'none'}")
                       for k in unknown or setup.control_pivots]
     made = kin.with_pivots({k: np.array(v.point) for k, v in setup.control_pivots.items()})
     result = []
@@ -49,5 +50,6 @@ def control_kinematics(machine: Machine, setup: SetupFile,
             held, true = (", ".join(f"{v:.4f}" for v in j.point) for j in (own, joint))
             result.append(error("pivot.mismatch", f"the control holds the pivot of {joint.name} at ({held}), the machine "
                                 f"file at ({true}): {off:.4f} mm apart, allowed {allowed:.4f} mm", file=options.setup,
+                                lines=line_of(options.setup, ("control_pivots", joint.name)),
                                 hint="correct the control's parameters, the machine file, or the set-up's [control_pivots]"))
     return made, result

@@ -14,7 +14,7 @@ from postproc.control.modes import ASKED, OutputModes
 from postproc.job.turned_places import turned
 from postproc.reference.moves import Moves
 from postproc.reference.repeated import Repeated, repeated
-from postproc.setup.model import Placement, SetupFile, at_places, part_placement
+from postproc.setup.model import Placement, SetupFile, at_places, line_of, part_placement
 from postproc.setup.places import PlaceOrder
 from postproc.setup.system import standing
 from toolpaths.arrays import Ints
@@ -69,8 +69,8 @@ def places_of(setup: SetupFile, toolpath: Toolpath, machine: Machine,
         result.append(Place(given.name if given else "", stood, placement, tuple(given.turned.items()) if given else ()))
     if setup.places and setup.clearance.centre is not None:
         found.append(error("places.centre", "clearance.centre is a point of one part, the set-up has [[places]]",
-                           file=options.setup, hint="take it out: safe planes stand round all parts, clearance.margin off "
-                           "what is cut"))
+                           file=options.setup, lines=line_of(options.setup, ("clearance", "centre")),
+                           hint="take it out: safe planes stand round all parts, clearance.margin off what is cut"))
     return tuple(result), found
 
 

@@ -10,7 +10,7 @@ from machines.machine import Machine
 from postproc.base.options import Options
 from postproc.controllers.model import ControllerFile
 from postproc.controllers.spelling import SmoothingLevel
-from postproc.setup.model import SetupFile
+from postproc.setup.model import SetupFile, line_of
 from toolpaths.arrays import Floats
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
@@ -66,7 +66,7 @@ def smoothing_plan(controller: ControllerFile, setup: SetupFile, options: Option
             one, why = default, NOT_FITTED
         if why is not None:
             found.append(error("setup.smoothing", f"[output.smoothing] {name!r} = {asked!r}: {why[0]}", file=options.setup,
-                               hint=why[1]))
+                               lines=line_of(options.setup, ("output", "smoothing", name)), hint=why[1]))
         named[name] = one
     stated = _stated(controller, options, default, named)
     named |= {} if stated == default else dict.fromkeys(sorted(names - named.keys()), stated)

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import BaseModel, Field, model_validator
 
 from machines.hooks import HooksModel
+from machines.toml_lines import KeyPath
 from machines.user_file import read_toml, validate
 from machines.user_model import UserModel
 from postproc.base.options import OutputMode
@@ -285,7 +286,7 @@ def other_machine(setup: SetupFile, machine: str, file: str) -> list[Diagnostic]
     if not setup.machine or setup.machine == machine:
         return []
     return [warning("setup.machine", f"the set-up is for the machine {setup.machine!r}, this is {machine!r}: places, "
-                    "lengths and speeds may be wrong here", file=file, lines=_line(file, ("machine",)),
+                    "lengths and speeds may be wrong here", file=file, lines=line_of(file, ("machine",)),
                     hint=f"write one for this machine (postproc setup new), or machine = {machine!r} in it where it fits "
                     "both")]
 
@@ -349,12 +350,15 @@ def part_placement(setup: SetupFile, file: str = "") -> tuple[Placement | None, 
     """
     x, y = np.array(setup.part.x_axis), np.array(setup.part.y_axis)
     if not np.linalg.norm(x) > 0.0 or not np.linalg.norm(y) > 0.0:
-        return None, [error("setup.axes", "part.x_axis and part.y_axis must not be zero", file=file)]
+        zero = "x_axis" if not np.linalg.norm(x) > 0.0 else "y_axis"
+        return None, [error("setup.axes", f"part.{zero} is 0, 0, 0, which is no direction", file=file,
+                            lines=line_of(file, ("part", zero)), hint="give two directions square to each other")]
     x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
     if abs(float(x @ y)) > 1e-6:
         found = np.degrees(np.arccos(np.clip(x @ y, -1.0, 1.0)))
         return None, [error("setup.axes", f"part.x_axis and part.y_axis enclose {found:.4f} degrees, allowed: 90",
-                            file=file, hint="give two directions square to each other" + _at_default(setup))]
+                            file=file, lines=line_of(file, ("part", "y_axis")),
+                            hint="give two directions square to each other" + _at_default(setup))]
     y = y - (x @ y) * x
     y = y / np.linalg.norm(y)
     return Placement(np.stack([x, y, np.cross(x, y)], axis=1), np.array(setup.part.origin)), []
@@ -381,10 +385,10 @@ def system_of(name: str, toolpath: Toolpath, file: str, key: str,
             return frame, []
     names = ", ".join(f.name for f in toolpath.frames)
     return None, [error(f"setup.{path[-1]}", f"{key} = {name!r} is not a system of the CL file", file=file or toolpath.file,
-                        lines=_line(file, path), hint=f"it has: {names}")]
+                        lines=line_of(file, path), hint=f"it has: {names}")]
 
 
-def _line(file: str, path: tuple[str, ...]) -> list[int]:
+def line_of(file: str, path: KeyPath) -> list[int]:
     """Where a set-up file states a key."""
     values = read_toml(file)[0] if file else None
     return [values.origin(path).line] if values else []

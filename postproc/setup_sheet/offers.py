@@ -22,8 +22,15 @@ def offers(result: PostResult, toolpath: Toolpath, machine: str, controller: str
     if missing:
         words = shlex.join([toolpath.file or "part.cls", "-m", machine, "-c", controller])
         rest = ", ".join(sorted(codes - OF_SETUP))
-        return [info("setup.offered", f"a set-up answers all of this: {', '.join(missing)}"
+        return [info("setup.offered", f"a set-up answers all of this: {', '.join([*missing, *_place(result)])}"
                      + (f"; put {rest} right first" if rest else ""),
                      hint=f"postproc setup new {words} -o part.setup.toml asks for all of "
                      "them at once, and finds a place that fits")]
     return found_place(result, toolpath)
+
+
+def _place(result: PostResult) -> list[str]:
+    """Where the part stands, where it matters and nobody has said it: travel is looked at only when the rest is known."""
+    stated = result.setup.part.model_fields_set or result.setup.places
+    turning = any(f"{letter}'" in result.machine.structure.split() for letter in "ABC")
+    return [] if stated or not turning else ["where the part stands on the table ([part])"]

@@ -227,7 +227,7 @@ class Every(UserModel):
     ("number = nan", "allowed: a finite number", ""),
     ("whole = 1.5", "whole = 1.5: allowed: a whole number", ""),
     ("place = 5", "place = 5: allowed: a list in square brackets", ""),
-    ("place = [1, 2]", "place = [1, 2]: allowed: 3 elements or more", ""),
+    ("place = [1, 2]", "place = [1, 2]: allowed: 3 elements", ""),
     ("place = [1, 2, 3,5]", "allowed: 3 elements or fewer", "decimal points"),
     ("some = [1.0, 2.5, 3.5]", "allowed: 2 elements or fewer", ""),
     ("table = 5", "table = 5: allowed: a table of keys and values", ""),

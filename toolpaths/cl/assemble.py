@@ -349,7 +349,7 @@ def _feeds(b: ToolpathBuilder, rows: PointRows, kind: Array) -> tuple[Floats, Ar
     b.log.many(Severity.WARNING, "cl.no-feed", "cutting motion before any FEDRAT",
                rows.line[~rapid & np.isnan(feed)])
     b.log.many(Severity.ERROR, "cl.feed", "cutting motion at a feed of 0 or less",
-               rows.line[~rapid & (feed <= 0.0)])
+               rows.line[~rapid & (feed <= 0.0)], "state a feed above 0 in the FEDRAT before, or RAPID where it cuts none")
     return feed, mode
 
 

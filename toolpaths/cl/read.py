@@ -236,8 +236,8 @@ def _units(program: StatementList, given: LengthUnit | None, log: DiagnosticLog)
     if len(said.words) > 1:
         log.error("cl.units", "the file changes its units", max(said.words.values()),
                   "give them with --units")
-    if said.words:
-        return next(iter(said.words))
+    if said.words or said.wrong:  # what is wrong has been said
+        return next(iter(said.words), next(iter(said.feeds), "mm"))
     return _units_of_feeds(said.feeds, log)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +12,7 @@ import typer
 
 from postproc.base.job_place import NAME
 from postproc.base.json_values import plain, rounded
-from postproc.cli.shared.says import SAYS, readable
+from postproc.cli.shared.says import SAYS, as_errors, readable
 
 if TYPE_CHECKING:
     from machines.machine import Machine
@@ -151,8 +152,6 @@ def shown_errors(json: str) -> Iterator[None]:
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
     """A bar on standard error for long work; silent where that is no terminal."""
-    import sys
-
     if SAYS.verbose:
         said: list[str] = []
         yield lambda stage, at, total: _say(stage, said)
@@ -217,6 +216,8 @@ def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, A
     lines = lines_of((*diagnostics, *more), Severity.WARNING if SAYS.quiet else Severity.INFO)
     for line in ([SAYS.job_line] if SAYS.job_line and lines else []) + lines:
         typer.echo(readable(line), err=True)
+    if not ok and not SAYS.quiet and sys.stderr.isatty():
+        typer.echo(address_of(diagnostics), err=True)
     if failed and outputs:
         values, text = {"diagnostics": [d.as_dict() for d in (*diagnostics, *more)]}, ""
     if target == "-":
@@ -225,6 +226,16 @@ def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, A
         typer.echo(readable(text))
     if failed or not ok:
         raise typer.Exit(1)
+
+
+def address_of(diagnostics: tuple[Diagnostic, ...]) -> str:
+    """Where the page of the error that is to be put right first stands."""
+    from toolpaths.diagnostics import Severity
+
+    codes = {d.code for d in diagnostics}
+    wrong = [d.code for d in diagnostics if d.severity is Severity.ERROR]
+    first = next((code for code in wrong if codes.isdisjoint(FOLLOWS.get(code, ()))), wrong[0])
+    return f"explained with an example: postproc explain {first}"
 
 
 def lines_of(diagnostics: tuple[Diagnostic, ...], least: Severity) -> list[str]:
@@ -262,15 +273,6 @@ def lines_of(diagnostics: tuple[Diagnostic, ...], least: Severity) -> list[str]:
             where = f", lines {', '.join(map(str, lines[:6]))}{', ...' if len(lines) > 6 else ''}" if lines else ""
             shown += [str(d), f"  and {len(group) - 1} more [{d.code}]{where}: --json names them all"]
     return shown
-
-
-def as_errors(diagnostics: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
-    """The diagnostics with warnings as errors."""
-    from dataclasses import replace
-
-    from toolpaths.diagnostics import Severity
-
-    return tuple(replace(d, severity=Severity.ERROR) if d.severity is Severity.WARNING else d for d in diagnostics)
 
 
 def _of_another_unit(diagnostics: tuple[Diagnostic, ...], job: str) -> tuple[Diagnostic, ...]:

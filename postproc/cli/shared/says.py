@@ -6,9 +6,13 @@ import os
 import stat
 import sys
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 from unicodedata import category
 
 from toolpaths.dataclass import dataclass
+
+if TYPE_CHECKING:
+    from toolpaths.diagnostics import Diagnostic
 
 
 @dataclass
@@ -76,3 +80,12 @@ def _waits() -> bool:
     except (OSError, ValueError):
         return True
     return sys.stdin is not None and (sys.stdin.isatty() or not (stat.S_ISCHR(kind) or stat.S_ISREG(kind)))
+
+
+def as_errors(diagnostics: tuple[Diagnostic, ...]) -> tuple[Diagnostic, ...]:
+    """The diagnostics with warnings as errors."""
+    from dataclasses import replace
+
+    from toolpaths.diagnostics import Severity
+
+    return tuple(replace(d, severity=Severity.ERROR) if d.severity is Severity.WARNING else d for d in diagnostics)

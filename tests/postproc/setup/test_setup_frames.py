@@ -140,10 +140,24 @@ def test_verify_uses_the_same_setup(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("part", "angle_found"), [({"x_axis": [1, 0, 0], "y_axis": [0.01, 1, 0]}, "89.4271"),
-                                                   ({"x_axis": [0, 0, 0]}, "must not be zero")])
+                                                   ({"x_axis": [0, 0, 0]}, "x_axis is 0, 0, 0"),
+                                                   ({"y_axis": [0, 0, 0]}, "y_axis is 0, 0, 0")])
 def test_skew_placement_is_refused(part: dict[str, list[float]], angle_found: str) -> None:
     placement, found = part_placement(setup(part=part))
     assert placement is None and angle_found in found[0].message
+
+
+@pytest.mark.parametrize(("text", "line"), [
+    ("[part]\nx_axis = [0, 0, 0]", 2), ("[part]\nx_axis = [1, 0, 0]\ny_axis = [1, 1, 0]", 3),
+    ("\nwork_offset_code = 'G60'", 2), ("[output.operations]\nNIX = 'axes'", 2), ("[output.smoothing]\nNIX = 'roughing'", 2),
+    ("\n[control_pivots.B]\npoint = [0, 0, 0]", 2), ("[control_pivots.A]\npoint = [0, 1, 0]", 1),
+    ("[[places]]\nname = 'a'\nwork_offset_code = 'G54'\n[[places]]\nname = 'b'\nwork_offset_code = 'G60'", 6)])
+def test_what_a_set_up_has_wrong_is_said_with_its_line(text: str, line: int, tmp_path: Path) -> None:
+    file = tmp_path / "s.toml"
+    file.write_text(text + "\n")
+    options = postproc.Options(setup=str(file))
+    found = postproc.convert(toolpath("GOTO/0,0,5"), machine("mikron-ucp710"), "linuxcnc", options=options).diagnostics
+    assert {d.lines for d in found if d.file == str(file)} == {(line,)}, [str(d) for d in found]
 
 
 def test_placement_and_back() -> None:

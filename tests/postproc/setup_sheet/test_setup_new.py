@@ -278,6 +278,7 @@ def test_convert_reports_all_that_is_missing_at_once_and_the_command_it_offers_w
     got = run(*words, code=1)
     expected = {"tool.number", "spindle.not_started", "feed.missing"}
     assert set(re.findall(r"error \[([\w.]+)\]", got.stderr)) == expected
+    assert ("where the part stands on the table" in got.stderr) == (machine_name == "head-table"), "it depends on it"
     offered = re.search(r"(postproc setup new .*?\.toml) asks", got.stderr)
     assert offered
     run(*shlex.split(offered[1])[1:], "--yes")
@@ -378,11 +379,23 @@ def test_a_question_on_a_terminal_stays_on_its_line(tmp_path: Path) -> None:
     assert b"\x1b" not in said
     assert not select.select([ours], [], [], 0.5)[0], "nothing is written behind the question"
     os.write(ours, b"3000\n")
-    with contextlib.suppress(OSError):  # as the end of a terminal is reported
-        while part := os.read(ours, 4096):
-            said += part
+    said += _until_closed(ours)
     assert command.wait(60) == 0 and b"1 question" in said
-    os.close(ours)
+    ours, theirs = pty.openpty()
+    wrong = subprocess.Popen([sys.executable, "-c", code, "machine", "check", str(file)], stderr=theirs)
+    os.close(theirs)
+    assert b"explained with an example: postproc explain file.syntax" in _until_closed(ours), "where a person reads"
+    assert wrong.wait(60) == 1
+
+
+def _until_closed(terminal: int) -> bytes:
+    """All that comes from a terminal until its end, which is reported as an error."""
+    said = b""
+    with contextlib.suppress(OSError):
+        while part := os.read(terminal, 4096):
+            said += part
+    os.close(terminal)
+    return said
 
 
 def test_the_unit_of_a_file_that_states_none_is_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
+import toolpaths
+from toolpaths.diagnostics import Severity
+
 ROOT = Path(__file__).parents[3]
 IN_MESSAGE = {"arrays.value"}
 """what is said of arrays in Python: no command leads there, and the remedy ends the message (`test_given_arrays.py`)"""
@@ -35,3 +38,13 @@ def test_an_error_without_a_hint_is_noticed(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text('b.log.error("cl.x", "wrong", 3)\nerror("y", "bad", file="f")\n'
                                    'b.log.error("z", "wrong", 3, "do this")\n')
     assert calls(tmp_path / "a.py") == [(1, "cl.x"), (2, "y")]
+
+
+def test_other_advice_is_another_line_and_one_cause_is_one() -> None:
+    """A cycle without plane and depth hid the second behind the first; units that are none were also said to be missing."""
+    head = "UNITS/MM\nLOADTL/1\nFEDRAT/300,MMPM\n"
+    for text, codes in ((head + "CYCLE/DRILL,MMPM,100\nGOTO/3,3,0\nGOTO/4,3,0\nCYCLE/OFF\n", ["cl.cycle-value"] * 2),
+                        (head.replace("MM", "CM", 1) + "GOTO/1,2,3\n", ["cl.units"]),
+                        (head + "GOTO/1;2;3\n" * 9, ["cl.number"])):
+        found = toolpaths.read_bytes(text.encode())[1]
+        assert [d.code for d in found if d.severity > Severity.INFO] == codes, [str(d) for d in found]
