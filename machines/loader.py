@@ -23,8 +23,9 @@ from machines.machine import ClampCodes, ControlOptions, Limits, Machine, Timing
 from machines.models import ControlModel, KinematicsModel, MachineModel, register_beyond
 from machines.plausible import implausible
 from machines.toml_lines import Values
-from machines.user_file import UserFile, nearest_word, read_toml, validate
+from machines.user_file import UserFile, read_toml, validate
 from machines.user_model import schema
+from machines.value_words import nearest_word
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, Severity, error, has_errors, read_value
 from toolpaths.units import DEG, PER_MINUTE
 

@@ -6,7 +6,6 @@ taken first, tables are merged key by key, everything else is replaced. Every pr
 
 from __future__ import annotations
 
-import difflib
 import json
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -20,7 +19,7 @@ from pydantic_core import ErrorDetails
 
 from machines.toml_lines import KEPT, SHORT, KeyPath, Values, dotted, own_copy, parsed, table_named
 from machines.user_model import SCHEMA_KEY, key_texts
-from machines.value_words import POINT, advice, allowed, decimal_comma
+from machines.value_words import POINT, advice, allowed, decimal_comma, meant, nearest, nearest_word
 from toolpaths.cl.text.kinds_of_file import what_is
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
@@ -131,27 +130,6 @@ def wrong_keys(file: UserFile, model: type[BaseModel]) -> list[KeyPath]:
     return []
 
 
-LISTED, NEAR = 40, 5
-"""most words that a hint lists; of more, so many are named"""
-
-
-def nearest(word: str, known: Sequence[str]) -> str:
-    """A hint: the known word nearest to `word`, else the list of all, of a long one those that are most alike."""
-    match = nearest_word(word, known)
-    if match is not None:
-        return f"did you mean {match!r}?"
-    if len(known) > LISTED:
-        some = difflib.get_close_matches(word.lower(), known, n=NEAR, cutoff=0.0)
-        return f"most alike of {len(known)} are: {', '.join(some)}"
-    return "known: " + ", ".join(sorted(known)) if known else ""
-
-
-def nearest_word(word: str, known: Sequence[str]) -> str | None:
-    """The known word that is most like `word`; None where none is."""
-    close = difflib.get_close_matches(word.lower(), [k.lower() for k in known], n=1, cutoff=0.6)
-    return next((k for k in known if close and k.lower() == close[0]), None)
-
-
 # ---- reading and merging -----------------------------------------------------------------------------------
 
 def _read(source: str, builtin: Mapping[str, FilePath], kind: str, wanted_by: UserFile | None,
@@ -200,7 +178,7 @@ def _text(path: FilePath, source: str, builtin: Mapping[str, FilePath], kind: st
     except FileNotFoundError:
         what = f"no {kind} is called {source!r}" + ("" if source in builtin else " and there is no such file")
         return None, error("file.not-found", what if builtin else f"there is no file {shown(path)}", file=file, lines=lines,
-                           hint=nearest(source.removesuffix(".toml"), sorted(builtin)) or f"name the file of the {kind}")
+                           hint=meant(path, source, sorted(builtin)) or f"name the file of the {kind}")
     except OSError as fault:
         return None, error("file.unreadable", f"cannot read {shown(path)}: {reason(fault)}", file=file, lines=lines,
                            hint=remedy(fault, f"name a TOML file of a {kind}"))

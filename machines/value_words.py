@@ -1,9 +1,12 @@
-"""What a key of a user's file may hold, in words, from what pydantic says of a value that is none of that."""
+"""What a key of a user's file may hold, in words, from what pydantic says of a value that is none of that; known words and
+files that a wrong one is most like."""
 
 from __future__ import annotations
 
+import difflib
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 _ALLOWED = {
@@ -52,3 +55,35 @@ def decimal_comma(line: str) -> str:
     """The number with a decimal comma at the end of a line that is no TOML; "" for none."""
     found = _COMMA.search(line)
     return f"{found[1]},{found[2]}" if found else ""
+
+
+LISTED, NEAR = 40, 5
+"""most words that a hint lists; of more, so many are named"""
+
+
+def nearest(word: str, known: Sequence[str]) -> str:
+    """A hint: the known word nearest to `word`, else the list of all, of a long one those that are most alike."""
+    match = nearest_word(word, known)
+    if match is not None:
+        return f"did you mean {match!r}?"
+    if len(known) > LISTED:
+        some = difflib.get_close_matches(word.lower(), known, n=NEAR, cutoff=0.0)
+        return f"most alike of {len(known)} are: {', '.join(some)}"
+    return "known: " + ", ".join(sorted(known)) if known else ""
+
+
+def nearest_word(word: str, known: Sequence[str]) -> str | None:
+    """The known word that is most like `word`; None where none is."""
+    close = difflib.get_close_matches(word.lower(), [k.lower() for k in known], n=1, cutoff=0.6)
+    return next((k for k in known if close and k.lower() == close[0]), None)
+
+
+def meant(path: Path, source: str, builtin: Sequence[str]) -> str:
+    """What a name may have meant, or what there is; of the name of a file only what is nearly the same: a file in its
+    folder, or one of ours without its ending."""
+    name = source.removesuffix(".toml")
+    if name == source:
+        return nearest(name, builtin)
+    near = nearest_word(path.stem, [one.stem for one in path.parent.glob("*.toml")])
+    meant = str(Path(source).with_name(f"{near}.toml")) if near else nearest_word(name, builtin)
+    return f"did you mean {meant!r}?" if meant else ""

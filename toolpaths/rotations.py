@@ -21,6 +21,16 @@ def rotation(direction: Floats, angle: Floats) -> Floats:
     return result
 
 
+_SQUARE = 1e-8
+"""rad by which a turn may be off quarter turns and is one: 1e-5 mm over a metre"""
+
+
+def squared(turn: Floats) -> Floats:
+    """A rotation (3, 3) with entries that are 0, 1 or -1 but for noise as just that."""
+    whole = np.round(turn)
+    return np.asarray(np.where(np.abs(turn - whole) < _SQUARE, whole, turn) + 0.0)
+
+
 def wrap(angle: Floats) -> Floats:
     """The same angles in (-pi, pi]."""
     result: Floats = angle - TWO_PI * np.ceil((angle - np.pi) / TWO_PI)

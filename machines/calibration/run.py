@@ -11,7 +11,8 @@ from machines.calibration.measurement_file import MeasurementModel, TableColumn
 from machines.geometric_error.tables.csv_table import ANGLES, LENGTHS, CsvTable
 from machines.geometric_error.tables.names import parse
 from machines.machine import Machine
-from machines.user_file import UserFile, nearest
+from machines.user_file import UserFile
+from machines.value_words import nearest
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, error, has_errors, info, warning
 

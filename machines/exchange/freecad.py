@@ -83,10 +83,13 @@ def read_freecad(path: Path, text: str, stated: Sequence[str]) -> tuple[Draft, d
         draft.error("import.geometry", f"axis {wrong[0]!r} is no linear axis X Y Z U V W and no rotary axis A B C",
                     _line(text, "axes", wrong[0]), "rename it in FreeCAD's machine editor")
         return draft, {}
+    if without := [name for name in "XYZ" if name not in machine.axes]:
+        draft.error("import.geometry", f"the machine has no axis {' '.join(without)}: a mill has X, Y and Z",
+                    _line(text, "axes"), "add it in FreeCAD's machine editor")
+        return draft, {}
     draft.put(("description",), machine.name or path.stem, _line(text, "machine", "name"), machine.name)
     draft.made(("kinematics", "kind"), "serial", "")
-    if "Z" in machine.axes:
-        draft.made(("retract_axis",), "Z", "")
+    draft.made(("retract_axis",), "Z", "")
     _structure(draft, machine, text)
     for name, axis in machine.axes.items():
         _axis(draft, name, axis, MM_PER_INCH if machine.units == "imperial" else 1.0, text)

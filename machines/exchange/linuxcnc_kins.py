@@ -68,6 +68,10 @@ def _tables(draft: Draft, module: str, pins: PinReader) -> None:
 def _head(draft: Draft, pins: PinReader) -> None:
     """C turns the head, B swivels it about a line P above the gauge point, against ISO 841 (5axiskins.c: s2r)."""
     pivot = pins.read("pivot-length", 250.0)
+    if pivot[0] < 0.0 and "kinematics.axes.B.point" not in draft.stated:
+        draft.error("import.geometry", f"the pivot length of 5axiskins is {pivot[0] * pins.scale:g} mm ({pivot[2]}): the "
+                    "head would swivel about a line below the gauge point of the spindle", pivot[1],
+                    "it counts up from the gauge point: state it, and the gain on its road, above 0")
     _structure(draft, "w b X Y Z C B (C1) t", "5axiskins")
     _put(draft, ("B", "point"), [0.0, 0.0, pivot[0] * pins.scale], [pivot])
     draft.made(("kinematics", "axes", "B", "direction"), [0.0, -1.0, 0.0], "5axiskins")

@@ -24,7 +24,7 @@ from machines.tolerances.influence import (
     single,
 )
 from machines.tolerances.sensitivity import LegDimension, RodsOfLegs
-from machines.user_file import nearest
+from machines.value_words import nearest
 from toolpaths.arrays import Floats
 from toolpaths.choices import FigureEnding
 from toolpaths.dataclass import dataclass

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Sequence
 from itertools import product
 from pathlib import Path
 
-from machines.user_file import UserFile, nearest
+from machines.user_file import UserFile
+from machines.value_words import nearest
 from postproc.batch.forms import INPUTS, CommandForm, CommandForms
 from postproc.batch.model import BatchFile, JobModel, OptionValue
 from toolpaths.dataclass import dataclass

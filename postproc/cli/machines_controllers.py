@@ -222,6 +222,6 @@ def schema(what: Annotated[list[str] | None, typer.Argument(metavar="NAME", help
         found: dict[str, Any] = file_schema(name) if name in FILES else result_schema(name)
         print_json(found)
     else:
-        from machines.user_file import nearest
+        from machines.value_words import nearest
 
         raise typer.BadParameter(f"no file and no command {name!r}; {nearest(name, [*FILES, *RESULTS])}", param_hint="NAME")

@@ -51,7 +51,7 @@ def pages() -> dict[str, CodePage]:
 
 def unknown(code: str) -> str:
     """A hint for a code that there is not: the nearest, else those of its area, else the areas."""
-    from machines.user_file import nearest
+    from machines.value_words import nearest
 
     known = list(pages())
     same = [one for one in known if one.split(".")[0] == code.split(".")[0]]

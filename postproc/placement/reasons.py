@@ -86,13 +86,16 @@ class NoOrientation:
 
 @dataclass(frozen=True)
 class AxisLacks:
-    """Travel that an axis lacks at the place of most margin, mm."""
+    """Travel that an axis lacks at the place of most margin, mm: at the end that lacks most, and at its other end."""
 
     axis: str
     missing: float
+    other: float = 0.0
 
     def __str__(self) -> str:
-        return f"axis {self.axis} lacks {self.missing:.3f} mm"
+        if self.other > 0.0:
+            return f"axis {self.axis} lacks {self.missing + self.other:.3f} mm of travel, both ends together"
+        return f"axis {self.axis} lacks {self.missing:.3f} mm at one end of its travel"
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,10 @@ _PER_RAD, _PER_SHARE = 100.0, 100.0
 """mm that one radian, and the whole distance from a singular position, count as"""
 
 
+_SCORE = np.array([1.0, _LITTLE])
+"""how much the margins of `Sampled` count"""
+
+
 class Region(Protocol):
     """Places (M, 3) of the set-up's point, of a part that is in one orientation."""
 
@@ -105,8 +109,10 @@ class Slabs:
                 raise ArithmeticError(f"no place of most margin: {found.message}")
             place = np.clip(found.x[:ANGLES], low, high)
         values = self.g @ place + self.c
-        margin = float(values.min())
-        return place, margin, AxisLacks(self.names[int(self.joint[int(values.argmin())])], -margin)
+        margin, end = float(values.min()), int(values.argmin())
+        across = (self.joint == self.joint[end]) & (self.g @ self.g[end] < 0.0)
+        other = max(0.0, -float(values[across].min(initial=np.inf)))
+        return place, margin, AxisLacks(self.names[int(self.joint[end])], -margin, other)
 
     def _worst(self, values: Floats) -> list[int]:
         """The row of least margin of each joint and direction."""
@@ -200,7 +206,11 @@ class Sampled:
 
     def margins(self, places: Floats) -> Floats:
         """See `Region`; the least of travel, reach and distance from singular positions."""
-        found = np.full(len(places), np.inf)
+        return self._values(places)[:, 0]
+
+    def _values(self, places: Floats) -> Floats:
+        """(M, 2) margins, and those without how far the tool axis leans, which is much the same at every place."""
+        found = np.full((len(places), 2), np.inf)
         for kin, tip, axis in self.poses:
             count = max(1, _CHUNK // (100 * len(tip)))
             for k in range(0, len(places), count):
@@ -209,47 +219,51 @@ class Sampled:
         return found
 
     def _of(self, kin: Kinematics, tip: Floats, axis: Floats, places: Floats) -> Floats:
-        """(M,) least margin of all poses, each on its best branch."""
+        """(M, 2) least margins of all poses, each on its best branch."""
         tips = (tip[None] + places[:, None]).reshape(-1, 3)
         q = kin.inverse(tips, np.tile(axis, (len(places), 1)), near=self.machine.home)
         best = np.max([self._joints(kin, branch) for branch in q], axis=0)
-        return np.asarray(best.reshape(len(places), -1).min(axis=1))
+        return np.asarray(best.reshape(len(places), -1, 2).min(axis=1))
 
     def _joints(self, kin: Kinematics, q: Floats) -> Floats:
-        """(N,) of joints (N, J)."""
+        """(N, 2) of joints (N, J): the least margin, and that without the lean of the tool axis."""
         limits, rotary = self.machine.limits, np.array(self.machine.rotary)
         travel = np.minimum(q - limits.lower, limits.upper - q) * np.where(rotary, _PER_RAD, 1.0)
         result = np.asarray(travel.min(axis=1))
         good = np.isfinite(q).all(axis=1)
         result[~good] = _NONE
-        if is_checked(kin) and good.any():
-            found = clearances.reach(kin, q[good])
-            result[good] = np.minimum(result[good], (found.values * np.where(found.angular, _PER_RAD, 1.0)).min(axis=1))
         if kin.singular_names and good.any():
             result[good] = np.minimum(result[good], _PER_SHARE * (kin.singular_distance(q[good]).min(axis=1) - self.least))
-        return np.where(np.isnan(result), _NONE, result)
+        both = np.stack([result, result], axis=1)
+        if is_checked(kin) and good.any():
+            found = clearances.reach(kin, q[good])
+            values = found.values * np.where(found.angular, _PER_RAD, 1.0)
+            upright = values[:, np.array(found.names) != "tilt"]
+            both[good] = np.minimum(both[good], np.stack([values.min(axis=1), upright.min(axis=1, initial=np.inf)], axis=1))
+        return np.where(np.isnan(both), _NONE, both)
 
     def deepest(self, low: Floats, high: Floats) -> tuple[Floats, float, Lack]:
-        """The best of a lattice, then compass steps."""
+        """The best of a lattice, then compass steps; where the lean decides, and no place changes it, the rest does."""
         lattice = np.unique(np.stack(np.meshgrid(*np.linspace(low, high, _COARSE).T), axis=-1).reshape(-1, ANGLES), axis=0)
-        values = self.margins(lattice)
-        place, best = lattice[values.argmax()], float(values.max())
-        step = 0.5 * (high - low) / (_COARSE - 1)
-        while float(step.max()) > _FINE:
-            around = np.clip(place + np.vstack([np.diag(step), -np.diag(step)]), low, high)
-            values = self.margins(around)
-            if values.max() > best:
-                place, best = around[values.argmax()], float(values.max())
+        place, best = lattice[0], np.array([-np.inf, -np.inf])
+        around, step = lattice, 0.5 * (high - low) / (_COARSE - 1)
+        while True:
+            values = self._values(around)
+            k = int((values @ _SCORE).argmax())
+            if values[k] @ _SCORE > best @ _SCORE:
+                place, best = around[k], values[k]
             else:
                 step = 0.5 * step
-        return place, best, self._deciding(place)
+            if float(step.max()) <= _FINE:
+                return place, float(best[0]), self._deciding(place)
+            around = np.clip(place + np.vstack([np.diag(step), -np.diag(step)]), low, high)
 
     def _deciding(self, place: Floats) -> MarginLacks:
         """What has least margin at a place (3,), as what it lacks."""
         found: list[tuple[float, str, float, str]] = []
         for kin, tip, axis in self.poses:
             branches = kin.inverse(tip + place, axis, near=self.machine.home)
-            q = max(branches, key=lambda branch: float(self._joints(kin, branch).min()))
+            q = max(branches, key=lambda branch: float(self._joints(kin, branch)[:, 0].min()))
             found += self._columns(kin, q)
         margin, name, unit, of = min(found)
         return MarginLacks(name, -margin / unit if margin > _NONE else None, of)

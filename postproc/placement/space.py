@@ -17,7 +17,7 @@ from postproc.setup.model import PartPlacement, Placement
 from postproc.setup.place import PlaceBox, PlacementLimits
 from toolpaths.arrays import Floats, box_corners
 from toolpaths.dataclass import dataclass
-from toolpaths.rotations import rotation
+from toolpaths.rotations import rotation, squared
 from toolpaths.shapes import arrays
 from toolpaths.units import DEG
 
@@ -162,7 +162,7 @@ class Space:
     def part(self, place: Floats) -> PartPlacement:
         """What [part] of a set-up says for a place; quarter turns as 0, 1, -1."""
         made = self.placement(place)
-        x, y = (tuple((np.round(made.rotation[:, k], 15) + 0.0).tolist()) for k in (0, 1))
+        x, y = (tuple(squared(made.rotation)[:, k].tolist()) for k in (0, 1))
         return PartPlacement(origin=tuple((np.round(made.origin, 9) + 0.0).tolist()), x_axis=x, y_axis=y)
 
 

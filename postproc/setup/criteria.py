@@ -8,9 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 from pydantic import ValidationError
 
-from machines.user_file import nearest_word
 from machines.user_model import UserModel
-from machines.value_words import AdvisedError
+from machines.value_words import AdvisedError, nearest_word
 from toolpaths.arrays import Array, Floats
 from toolpaths.dataclass import dataclass
 from toolpaths.plug_ins import PlugIn, PlugInFault, plug_in, registered, said

@@ -26,6 +26,7 @@ from postproc.setup_sheet.odd_record import odd_record
 from toolpaths.arrays import Floats
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, Severity, info
+from toolpaths.rotations import squared
 from toolpaths.toolpath import Kind, Toolpath
 from toolpaths.units import DEG
 
@@ -34,8 +35,8 @@ PLACES = frozenset({*BEYOND, "link.blocked", "link.home", "path.jump", "reach.ax
 """codes of errors that another place or attitude may put right"""
 _ATTITUDES, _PROOFS = 12, 6
 """attitudes that are looked at; conversions before giving up"""
-_ROUND = 2.0
-"""mm of margin from which a place is rounded to whole mm"""
+_ROUND, _NOISE = 2.0, 1e-6
+"""mm of margin from which a place is rounded to whole mm, below it where that costs none; margins that are one"""
 _MOST = 20_000
 """rows of a path for which a refusal looks for a place by itself"""
 
@@ -237,12 +238,12 @@ def _deepest(work: PassContext, space: Space, one: Attitude, least: float) -> tu
         place, margin, lack = region.deepest(*_room(work, space, one))
     except ArithmeticError as fault:
         return None, -np.inf, str(fault)
-    if not margin >= 0.0:
+    if not margin >= -_NOISE:
         return None, -np.inf if np.isnan(margin) else margin, f"at best {lack}"
-    if margin > _ROUND:
-        near = np.round(place)
-        at = float(region.margins(near[None, :])[0])
-        place, margin = (near, at) if at >= 0.0 else (place, margin)
+    near = np.round(place)
+    at = float(region.margins(near[None, :])[0])
+    if at >= (0.0 if margin > _ROUND else margin - _NOISE):
+        place, margin = near, at
     return FoundPlace(_part(one, place[:ANGLES]), one, margin), margin, ""
 
 
@@ -271,6 +272,6 @@ def _room(work: PassContext, space: Space, one: Attitude) -> tuple[Floats, Float
 
 def _part(one: Attitude, origin: Floats) -> PartPlacement:
     """[part] of an attitude; quarter turns as 0, 1, -1."""
-    x, y = ((np.round(one.turn[:, k], 15) + 0.0).tolist() for k in (0, 1))
+    x, y = (squared(one.turn)[:, k].tolist() for k in (0, 1))
     at = (np.round(origin, 6) + 0.0).tolist()
     return PartPlacement(origin=(at[0], at[1], at[2]), x_axis=(x[0], x[1], x[2]), y_axis=(y[0], y[1], y[2]))

@@ -30,6 +30,9 @@ _ROWS = [  # code, records as found, as the hint has them, word of the hint
     ("cl.indirv", BEGIN + "INDIRV/1,0", BEGIN + "INDIRV/1,0,0", "INDIRV/i,j,k"),
     ("cl.indirv", "INDIRP/1,0,0", BEGIN + "INDIRP/1,0,0", "GOTO, then INDIRP"),
     ("cl.cycle", BEGIN + "CYCLE/ON", BEGIN + "CYCLE/DRILL,DEPTH,5,CLEAR,2,MMPM,100\nCYCLE/OFF\nCYCLE/ON", "state the cycle"),
+    ("cl.feed", "FEDRAT/MMPM", "FEDRAT/MMPM,250.0", "FEDRAT/MMPM,250.0"),
+    ("cl.feed", "FEDRAT/MMPM,0", "FEDRAT/MMPM,60", "a feed above 0"),
+    ("cl.feed", "FEDRAT/MMPM,0", "FEDRAT/MMPM,0\nRAPID", "RAPID where it cuts none"),
     ("cl.feed", "FEDRAT/INVERS", "FEDRAT/INVERS,2.5", "INVERS,2.5"),
     ("cl.frame", f"MSYS/0,0,0,{AXES},1", f"MSYS/0,0,0,{AXES}", "9 numbers"),
     ("cl.frame", "MSYS/0,0,0,2,0,0,0,1,0", f"MSYS/0,0,0,{AXES}", "of length 1"),
@@ -134,4 +137,9 @@ def _row(code: str, wrong: str, right: str, word: str) -> HintCase:
     )
 
 
-CL = [_row(*row) for row in _ROWS]
+_FREECAD = "(Exported by FreeCAD)\n(Begin operation: Profile)\nG90 G21\nM6 T1\nM3 S1000\nG0 X0 Y0 Z5\nG1 Z-1{}\nG1 X9\nM2\n"
+CL = [
+    *(_row(*row) for row in _ROWS),
+    HintCase("cl.feed", "inspect part.nc", {"part.nc": _FREECAD.format("")}, "write F with the first cut",
+             (Edit("part.nc", "Z-1", "Z-1 F100"),)),
+]

@@ -117,6 +117,12 @@ _PATH = [
         ),
     ),
     convert(
+        "convert.turning",
+        START + "SPINDL/SMM,120,CLW\n" + CUT,
+        "a surface speed .* of a mill is stated by (RPM)",
+        part("SMM,120", r"\1,3000"),
+    ),
+    convert(
         "cutcom.arc",
         START
         + "CUTTER/10\nRAPID\nGOTO/20,0,20\nGOTO/20,0,2\nCUTCOM/LEFT\n"

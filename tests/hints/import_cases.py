@@ -18,6 +18,13 @@ def _case(code: str, says: str, ini: str, *does: Edit, **files: str) -> HintCase
 
 TABLE = "$MC_TRAFO_TYPE_1=40\n$MC_TRAFO5_AXIS1_1[0]=-1\n$MC_TRAFO5_BASE_TOOL_1[2]=-600\n"
 RECORD = '$TC_CARR23[1]="P"\n$TC_CARR7[1]=-1\n$TC_CARR6[1]=-600\n$TC_CARR46[1]=0.004\n'
+FIVE = (HEADER.format(kins="5axiskins coordinates=XYZBCW").replace("= 4", "= 6").replace("= XYZA", "= XYZBCW")
+        + "".join(f"[JOINT_{k}]\nMIN_LIMIT = -100\nMAX_LIMIT = 100\n" for k in range(6)) + "[HAL]\nHALFILE = shop.hal\n")
+GAIN = ("loadrt sum2 names=s\nsetp s.gain0 -1\nsetp s.in0 250\nnet tool motion.tooloffset.z => s.in1\n"
+        "net pivot s.out => 5axiskins.pivot-length\n")
+FREECAD = '{"machine": {"name": "m", "units": "metric", "axes": {' + ", ".join(
+    f'"{name}": {{"type": "linear", "role": "head_linear", "limits": {{"min": -100, "max": 100}}, "max_velocity": 9000}}'
+    for name in "XYZ") + "}}}"
 TABLE_530 = "KEY AXIS COORD\nMachAxis X\nMachAxis Y\nMachAxis Z\nTrans Z -500\nMachAxis C\n[END]\n"
 
 IMPORTS = [
@@ -31,6 +38,10 @@ IMPORTS = [
     _case("import.geometry", r"STRUCTURE = (w A' b X Y Z \(C1\) t), POINT_A = (0 0 0)",
           HEADER.format(kins="trivkins coordinates=XYZA") + JOINTS,
           Edit("shop.ini", "", "[POSTPROC]\nSTRUCTURE = \\1\nPOINT_A = \\2\n")),
+    _case("import.geometry", "state it, and the (gain) on its road, above 0", FIVE, Edit("shop.hal", "gain0 -1", r"\g<1>0 1"),
+          shop_hal=GAIN),
+    HintCase("import.geometry", "machine import m.fcm -o shop.toml", {"m.fcm": FREECAD.replace("Z", "W")},
+             "add it in FreeCAD's machine editor", (Edit("m.fcm", '"W"', '"Z"'),)),
     _case("import.number", "write a number", XYZ.replace("MAX_LIMIT = 100", "MAX_LIMIT = far", 1),
           Edit("shop.ini", "= far", "= 250")),
     _case("import.travel", "write MIN_LIMIT and (MAX_LIMIT)", XYZ.replace("MAX_LIMIT = 100\n", "", 1),

@@ -109,6 +109,13 @@ _TOOLS = [
         setup=LENGTH + "[part]\nx_axis = [0.0, 1.0, 0.0]\n",
     ),
     convert(
+        "setup.axes",
+        START + CUT,
+        "give two directions square to each other$",
+        sheet("0.0, 0.0, 0.0", "1.0, 0.0, 0.0"),
+        setup=LENGTH + "[part]\nx_axis = [0.0, 0.0, 0.0]\n",
+    ),
+    convert(
         "setup.assumed",
         START.replace("FEDRAT/MMPM,600\n", "") + CUT,
         "take its name out of `(assumed)`",

@@ -99,6 +99,9 @@ _ANY_NUMBERS = {"FEDRAT": _FEED_MODIFIERS, "SPINDL": frozenset({"MAXRPM", "RANGE
 """Words with which a record takes numbers of their own."""
 _VALUED, _VALUED_IN = frozenset({"OSETNO", "ADJUST", "OFFSET", "LENGTH"}), frozenset({"LOADTL", "LOAD", "TURRET"})
 """Words that a number must follow, and in which records."""
+_SPEEDS = ("RPM", "SFM", "SMM")
+_SPEED_ALONE = frozenset({*_SPEEDS, "CLW", "CCLW"})
+"""Words of a speed, and with which it has a number."""
 _NAMED = frozenset({"TOOL PATH", "OPNAME", "OP_NAME", "CSI_TOOL_PATH", "OPFEATSTART", "TOOLNO", "$$->FEATNO", *TEXT_WORDS})
 _EVERYDAY = frozenset({"LOAD", "END", "STOP", "HEAD", "CHECK", "AIR", "SET", "DELETE"})
 """Words that stand in sentences too."""
@@ -288,6 +291,8 @@ def _numbers_fault(s: Statement, form: RecordForm) -> str:
         bare = [w for w, after in zip(s.words, (*s.words, "")[1:], strict=True) if w in _VALUED and isinstance(after, str)]
         if bare:
             return f"no number behind {bare[0]}"
+    if s.major == "SPINDL" and not count and s.has(*_SPEEDS) and _SPEED_ALONE.issuperset(s.words):
+        return f"no number with {next(w for w in s.words if w in _SPEEDS)}"
     if s.has(*_ANY_NUMBERS.get(s.major, ())):
         counts = frozenset()
     if counts and count not in counts:

@@ -36,7 +36,7 @@ from machines.geometric_error.tables.screw_tables import from_linuxcnc
 from machines.geometric_error.tables.table_curves import Fault, table_curve
 from machines.kinematics.chain import ROTARY
 from machines.machine import Machine
-from machines.user_file import nearest
+from machines.value_words import nearest
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error, has_errors, warning
 from toolpaths.input_files import read_input

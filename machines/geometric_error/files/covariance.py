@@ -14,7 +14,8 @@ from machines.geometric_error.actual.rods import RodErrors
 from machines.geometric_error.files.file_models import ErrorFileModel
 from machines.geometric_error.tables.csv_table import UNITS, read_text
 from machines.geometric_error.tables.names import parse
-from machines.user_file import UserFile, nearest
+from machines.user_file import UserFile
+from machines.value_words import nearest
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, Severity, error
 

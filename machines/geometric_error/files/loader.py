@@ -25,8 +25,9 @@ from machines.geometric_error.tables.names import SPINDLE, ErrorName, parse
 from machines.geometric_error.tables.table_curves import Fault, table_curve
 from machines.kinematics.chain import ROTARY
 from machines.machine import Machine
-from machines.user_file import UserFile, nearest, read_toml, validate
+from machines.user_file import UserFile, read_toml, validate
 from machines.user_model import schema
+from machines.value_words import nearest
 from toolpaths.arrays import Floats, Ints
 from toolpaths.diagnostics import Diagnostic, Severity, has_errors, read_value, warning
 from toolpaths.units import DEG

@@ -12,6 +12,7 @@ import typer
 
 from postproc.base.job_place import NAME
 from postproc.base.json_values import plain, rounded
+from postproc.cli.shared.causes import FOLLOWS, lines_of
 from postproc.cli.shared.says import SAYS, as_errors, readable
 
 if TYPE_CHECKING:
@@ -19,30 +20,13 @@ if TYPE_CHECKING:
     from postproc.base.options import Options
     from postproc.base.progress import Progress
     from postproc.controllers.model import ControllerFile
-    from toolpaths.diagnostics import Diagnostic, Severity
+    from toolpaths.diagnostics import Diagnostic
     from toolpaths.toolpath import Toolpath
 
 Json = Annotated[str, typer.Option("--json", metavar="FILE", help="write the figures as JSON; - for standard output")]
 
 SCHEMA_VERSION = 1
 """of the JSON objects of all commands; it rises where a key changes its meaning or goes"""
-ALIKE = 4
-"""diagnostics of one code and one remedy up to which each is shown"""
-PLACED = frozenset({"travel.exceeded", "reach.axis", "reach.position", "link.blocked", "link.home", "path.jump"})
-"""codes whose remedy is that of `place.found`, where that is said"""
-_MOVE, _LOWER = "move the part in the set-up (part.origin)", "lower clearance.margin"
-_SHORTER = "use a shorter tool (gauge_length)"
-WITHOUT_MOVE = {_MOVE: "", f"{_MOVE}, or {_LOWER}": _LOWER, f"{_MOVE}, turn it, or {_LOWER}": _LOWER,
-                f"{_MOVE}, {_LOWER}, or {_SHORTER}": f"{_LOWER}, or {_SHORTER}"}
-"""remedies of travel and reach, and what is left of each where no place of the part fits"""
-FOLLOWS = {"cl.no-feed": ("feed.missing", "cl.feed", "convert.turning"), "cl.no-units": ("cl.empty", "convert.turning"),
-           "cl.rapid-below": ("cl.cycle-depth",),
-           "setup.tool_unused": ("tool.number",), "place.found": ("path.odd_record",),
-           "joints.chosen": ("travel.exceeded", "reach.axis", "path.odd_record"),
-           **dict.fromkeys(PLACED, ("path.odd_record",))}
-"""by code: its causes; where one of them is said, people read that alone"""
-CAUSES = {"setup.machine": PLACED, "setup.upside_down": PLACED, "cl.no-units": PLACED}
-"""by code of a warning: errors that it may be the cause of; where one of them is said, it stands before them"""
 LONGEST_NAME = 255
 """characters that the name of a file may have"""
 
@@ -236,43 +220,6 @@ def address_of(diagnostics: tuple[Diagnostic, ...]) -> str:
     wrong = [d.code for d in diagnostics if d.severity is Severity.ERROR]
     first = next((code for code in wrong if codes.isdisjoint(FOLLOWS.get(code, ()))), wrong[0])
     return f"explained with an example: postproc explain {first}"
-
-
-def lines_of(diagnostics: tuple[Diagnostic, ...], least: Severity) -> list[str]:
-    """Diagnostics for people: of many with one code and one remedy the first, and where the others are; of one
-    wrong number one line. Where there are errors they come first, before them alone what may be their cause, and what only
-    follows from another is left out. JSON has them all, in the order of the stages."""
-    from dataclasses import replace
-
-    from toolpaths.diagnostics import Severity, has_errors
-
-    if has_errors(diagnostics):
-        codes = {d.code for d in diagnostics}
-        diagnostics = tuple(sorted((d for d in diagnostics if codes.isdisjoint(FOLLOWS.get(d.code, ()))),
-                                   key=lambda d: (codes.isdisjoint(CAUSES.get(d.code, ())) or d.severity < Severity.WARNING,
-                                                  -d.severity)))
-        if least <= Severity.INFO and any(d.code == "place.found" and "[part]" in d.hint for d in diagnostics):
-            diagnostics = tuple(replace(d, hint="") if d.code in PLACED and "system =" not in d.hint else d
-                                for d in diagnostics)
-        elif any(d.code == "place.found" for d in diagnostics):
-            diagnostics = tuple(replace(d, hint=WITHOUT_MOVE.get(d.hint, d.hint)) for d in diagnostics)
-    groups: dict[tuple[Severity, str, str], list[Diagnostic]] = {}
-    for d in diagnostics:
-        if d.severity >= least:
-            groups.setdefault((d.severity, d.code, d.hint), []).append(d)
-    shown: list[str] = []
-    said: set[tuple[Severity, str, str]] = set()
-    for d in diagnostics:
-        key = d.severity, d.code, d.hint
-        group = groups.get(key, [])
-        if len(group) <= ALIKE:
-            shown += [str(d)] if d.severity >= least else []
-        elif key not in said:
-            said.add(key)
-            lines = sorted({line for one in group[1:] for line in one.lines})
-            where = f", lines {', '.join(map(str, lines[:6]))}{', ...' if len(lines) > 6 else ''}" if lines else ""
-            shown += [str(d), f"  and {len(group) - 1} more [{d.code}]{where}: --json names them all"]
-    return shown
 
 
 def _of_another_unit(diagnostics: tuple[Diagnostic, ...], job: str) -> tuple[Diagnostic, ...]:

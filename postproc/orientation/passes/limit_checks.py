@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from machines.user_file import nearest, read_toml
+from machines.user_file import read_toml
+from machines.value_words import nearest
 from postproc.orientation.passes.allowed import AllowedAxes, off_centre, own_outside
 from postproc.orientation.passes.passes import Pass, PassContext
 from postproc.setup.orientation import OrientationLimits

@@ -9,7 +9,7 @@ import pytest
 
 import toolpaths
 from machines.loader import builtin
-from postproc.cli.shared.console import ALIKE, lines_of
+from postproc.cli.shared.causes import ALIKE, lines_of
 from postproc.setup.system import with_system
 from tests.postproc.cli.test_cli import run
 from tests.postproc.kit import convert, toolpath

@@ -113,7 +113,7 @@ def test_what_lacks_most_travel_is_said() -> None:
     """From 440 the pass still ends 20 mm beyond the travel of X."""
     fault = refused(passes((1.0, 0.0)), machine("mill-3axis"), setup_of((480.0, 0.0, 0.0), x=(440.0, 480.0)))
     assert fault.code == "place.none"
-    assert "axis X lacks 20.000 mm" in fault.message
+    assert "axis X lacks 20.000 mm at one end of its travel" in fault.message
 
 
 def test_turning_the_part_finds_the_longer_travel() -> None:
