@@ -59,6 +59,7 @@ def points_of(form: PivotForm, table: tuple[str, ...], head: tuple[str, ...],
               given: Mapping[str, tuple[float, float, float]]) -> tuple[dict[str, Floats], list[str]]:
     """A point of each axis, mm, machine coordinates, and what is wrong with the numbers.
 
+    No points where a chain does not close: what else is odd about them would be the same slip once more.
     Vectors of the head begin at its axis next to the tool. "MRZP second" left out: both axes go through one point.
     """
     chains = names_of(form, table, head)
@@ -71,7 +72,7 @@ def points_of(form: PivotForm, table: tuple[str, ...], head: tuple[str, ...],
     if missing:
         lacks = f"{', '.join(missing)} missing: X, Y and Z in mm"
         return {}, [f"{'; '.join(wrong)}; {lacks}" if wrong else lacks]
-    points = dict[str, Floats]()
+    points, closed = dict[str, Floats](), True
     at = np.zeros(3)
     for chain, letters in zip(chains[::-1], (head[::-1], table), strict=True):
         vectors = {name.strip("()"): np.array(given.get(name.strip("()"), (0.0, 0.0, 0.0))) for name in chain}
@@ -82,5 +83,6 @@ def points_of(form: PivotForm, table: tuple[str, ...], head: tuple[str, ...],
         closing = chain[-1].strip("()") if chain and "(" in chain[-1] else ""
         if closing in given and float(np.abs(vectors[closing] + at).max()) > CLOSES:
             says = ", ".join(f"{v:g}" for v in -at)
+            closed = False
             wrong.append(f"{closing} closes the chain and would be [{says}], found {list(given[closing])}: see to the signs")
-    return points, wrong
+    return points if closed else {}, wrong

@@ -105,6 +105,10 @@ def _text(made: NewMachine, output: Path, drawing: str) -> str:
     if unproved:
         lines.append(f"senses of {', '.join(unproved)} are not proved: jog each by +10, write what was seen into the sheet")
     if made.unread:
+        jogged = [name for name, turns in zip(made.machine.axis_names, made.machine.rotary, strict=True)
+                  if turns and name not in unproved]
+        lines += [f"senses of {', '.join(jogged)} are those of the jogs: no other figure of the sheet contradicts a jog "
+                  "answered wrongly, [touched] does"] if jogged else []
         lies = "lies" if len(made.unread) == 1 else "lie"
         lines.append(f"where {', '.join(made.unread)} {lies} is not proved: a pivot off by some mm passes every rule; touch "
                      "a ball in several poses and write [touched] into the sheet, or run the check program")

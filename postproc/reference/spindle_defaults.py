@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left, bisect_right
 from dataclasses import replace
 from itertools import pairwise
@@ -30,6 +31,8 @@ _COOLANT = {"off": "OFF", "flood": "FLOOD", "mist": "MIST", "through": "THRU", "
 _ALONG = 1e-9
 """by which the cosine between a straight retract and the tool axis may be less than 1"""
 _OFF = frozenset({"OFF", "NEUTRL", "NEUTRAL"})
+_FASTEST = 400_000.0
+"""rev/min: beyond the air-bearing spindles that drill circuit boards, the fastest that cut"""
 _DRY: tuple[str | float, ...] = ("OFF",)
 
 
@@ -238,12 +241,14 @@ def standing_cuts(toolpath: Toolpath) -> list[Diagnostic]:
 
 def too_fast(toolpath: Toolpath, largest: float) -> list[Diagnostic]:
     """An error where the file, or the set-up for it, asks for more than the spindle's largest speed, rev/min: a control
-    runs the largest, and feeds per turn and taps with it."""
+    runs the largest, and feeds per turn and taps with it. Where the machine states none, what no spindle that mills does."""
+    source, largest = ("the machine has at most {} ([control] largest_spindle_speed)", largest) if largest < math.inf else (
+        "no milling spindle turns faster than {}, and [control] largest_spindle_speed of the machine states none", _FASTEST)
     asked = [(state.rpm, line) for state, line in spindle_changes(toolpath) if state.rpm > largest]
     if not asked:
         return []
-    return [error("spindle.too_fast", f"the spindle would turn at {max(asked)[0]:g} rev/min, the machine has at most "
-                  f"{largest:g} ([control] largest_spindle_speed)", file=toolpath.file,
+    return [error("spindle.too_fast", f"the spindle would turn at {max(asked)[0]:g} rev/min, {source.format(f'{largest:g}')}",
+                  file=toolpath.file,
                   lines=sorted({line for _, line in asked if line > 0})[:6], count=len(asked),
                   hint=f"state at most {largest:g} in SPINDL, or in the set-up's spindle, and feeds that go with it")]
 

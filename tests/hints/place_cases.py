@@ -15,6 +15,8 @@ _REACH = [
     convert("path.odd_record", START + ODD, "correct the record there", part("4000", "0"), stops=()),
     convert("spindle.too_fast", FAST + CUT, r"state at most ([0-9]+) in SPINDL", part("9000", r"\1"),
             m=machine_text("mill-3axis") + "\n[control]\nlargest_spindle_speed = 8000\n"),
+    convert("spindle.too_fast", FAST.replace("9000", "900000") + CUT, r"state at most ([0-9]+) in SPINDL", part("900000", r"\1"),
+            m=machine_text("mill-3axis")),
     convert("reach.position", START + CUT, r"\(part\.(origin)\)", sheet("", "[part]\norigin = [0.0, 0.0, -750.0]\n"),
             machine="h4a-c-table"),
     convert("singular.distance", START + CUT, "state another (joints).(singular_distance)",
@@ -29,8 +31,8 @@ _REACH = [
             more=" --output-mode axes"),
     convert("place.found", START + CUT, r"\[part\] (origin = \[.*?\]), (x_axis = \[.*?\]), (y_axis = \[.*?\]) in the set-up",
             sheet("", r"[part]\n\1\n\2\n\3\n"), machine="haas-umc-750", control="haas-ngc", stops=("travel.exceeded",)),
-    convert("reach.clearance", START + CUT, r"\(part\.(origin)\)", sheet("190.0", "-60.0"), machine=DELTA,
-            setup=AT.format(z=190.0)),
+    convert("reach.clearance", START + CUT, r"\(part\.(origin)\)", sheet("[300.0", "[0.0"), machine=DELTA,
+            setup=AT.format(z=-60.0).replace("[0.0", "[300.0")),
 ]
 FLAT = START + "RAPID\nGOTO/0,0,0\nGOTO/9,0,0\nRAPID\nGOTO/9,9,0\n"
 PLANAR = "planar-delta"

@@ -120,7 +120,9 @@ CAUSES = {"4000 for 40": ("GOTO/40,30", "GOTO/4000,30", "path.odd_record"),
           "no feed": ("FEDRAT/MMPM,600", "", "feed.missing"),
           "feed 0": ("MMPM,600", "MMPM,0", "cl.feed"), "no tool": ("LOADTL/1", "", "tool.number"),
           "a turned axis": ("GOTO/40,30,0", "GOTO/40,30,0,0.6,0,-0.8", "path.odd_record"),
-          "fast": ("RPM,1000", "RPM,90000", "spindle.too_fast")}
+          "fast": ("RPM,1000", "RPM,90000", "spindle.too_fast"), "no speed": ("RPM,1000", "RPM", "cl.form"),
+          "a unit misspelt": ("MMPM,600", "MMPX,600", "cl.form"),
+          "a mark left": ("GOTO/40,30,0", "GOTO/40,$\nGOTO/40,30,0", "cl.continuation")}
 
 
 @pytest.mark.parametrize("what", CAUSES)
@@ -165,5 +167,5 @@ def test_a_file_that_is_far_larger_than_the_machine_has_no_odd_record(tmp_path: 
     assert got.stderr.count("[part]") + got.stderr.count("more travel") == 1, "one remedy"
     (tmp_path / "p.apt").write_text("\n".join([*START, *SQUARE, "FINI"]).replace("GOTO/40,", "GOTO/3000,"))
     got = run("convert", tmp_path / "p.apt", "-m", "mill-3axis", "-c", "linuxcnc", "-o", tmp_path / "p.ngc")
-    assert "no place of the part" in got.stderr and "more travel" in got.stderr
+    assert "wherever the part stands" in got.stderr and "more travel" in got.stderr
     assert "(part.origin)" not in got.stderr, "remedies do not contradict each other"

@@ -38,7 +38,7 @@ def test_the_questions_make_the_sheet_and_the_machine(folder: Path) -> None:
     got = run("machine", "new", "s.toml", "-o", "asked.toml", answers="\n".join(ANSWERS) + "\n")
     assert got.exit_code == 0, got.output
     assert "has no unit" in got.output and "not three numbers" in got.output
-    assert "where B, C lie is not proved" in got.output
+    assert "where B, C lie is not proved" in got.output and "no other figure of the sheet contradicts a jog" in got.output
     Path("t.toml").write_text(TRUNNION)
     assert run("machine", "new", "t.toml", "-o", "typed.toml").exit_code == 0
     asked, typed = machines.load("asked.toml"), machines.load("typed.toml")

@@ -15,13 +15,16 @@ from postproc.base.options import Options
 from postproc.orientation.passes.passes import work_of
 from postproc.placement.place import place
 from postproc.placement.place_times import Timer
-from postproc.placement.region import Slabs, region_of
+from postproc.placement.reasons import MarginLacks
+from postproc.placement.region import Sampled, Slabs, region_of
 from postproc.placement.search import PlaceSearch
 from postproc.placement.space import ANGLES, Space, matrix, space_of
 from postproc.setup.model import PartPlacement, Placement, RewindSettings, SetupFile, load_setup, part_placement
 from postproc.setup.place import PlacementLimits
 from tests.postproc.kit import SAMPLES, machine
 from tests.postproc.placement.test_placement import passes, placed, refused, setup_of
+from toolpaths.arrays import Floats
+from toolpaths.rotations import squared
 
 DELTA = "uranesx"
 
@@ -192,3 +195,24 @@ def test_a_place_that_only_its_links_make_worse_is_not_taken() -> None:
     assert min(one.seconds for one in choice.known) < choice.found.now.seconds
     assert choice.best is choice.found.now and "place.kept" in {d.code for d in more}
     assert choice.program[0] == choice.program[1] > 0.0
+
+
+class Leaning(Sampled):
+    """A lean that is at its limit wherever the part stands; the rest of the margin is greatest at (30, 0, -20)."""
+
+    def _values(self, places: Floats) -> Floats:
+        rest = 100.0 - np.linalg.norm(places - [30.0, 0.0, -20.0], axis=1)
+        return np.stack([np.minimum(rest, 0.0), rest], axis=1)
+
+    def _deciding(self, place: Floats) -> MarginLacks:
+        return MarginLacks("tilt", 0.0, "degrees")
+
+
+def test_where_the_lean_decides_the_rest_chooses_the_place() -> None:
+    place, margin, _ = Leaning(machine("tricept"), (), 0.0).deepest(np.full(3, -80.0), np.full(3, 80.0))
+    assert margin == 0.0 and np.abs(place - [30.0, 0.0, -20.0]).max() < 4.0
+
+
+def test_a_turn_that_is_a_quarter_but_for_noise_is_written_as_one() -> None:
+    noise = np.array([[-1.0, 1.02866e-09, 0.0], [0.0, -1.0, 0.0], [1e-6, 0.0, 1.0]])
+    np.testing.assert_array_equal(squared(noise), [[-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [1e-6, 0.0, 1.0]])
