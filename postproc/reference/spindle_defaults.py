@@ -247,8 +247,8 @@ def too_fast(toolpath: Toolpath, largest: float) -> list[Diagnostic]:
     asked = [(state.rpm, line) for state, line in spindle_changes(toolpath) if state.rpm > largest]
     if not asked:
         return []
-    return [error("spindle.too_fast", f"the spindle would turn at {max(asked)[0]:g} rev/min, {source.format(f'{largest:g}')}",
-                  file=toolpath.file,
+    says = source.format(f"{largest:g}")
+    return [error("spindle.too_fast", f"the spindle would turn at {max(asked)[0]:g} rev/min, {says}", file=toolpath.file,
                   lines=sorted({line for _, line in asked if line > 0})[:6], count=len(asked),
                   hint=f"state at most {largest:g} in SPINDL, or in the set-up's spindle, and feeds that go with it")]
 
