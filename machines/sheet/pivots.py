@@ -59,7 +59,7 @@ def points_of(form: PivotForm, table: tuple[str, ...], head: tuple[str, ...],
               given: Mapping[str, tuple[float, float, float]]) -> tuple[dict[str, Floats], list[str]]:
     """A point of each axis, mm, machine coordinates, and what is wrong with the numbers.
 
-    No points where a chain does not close: what else is odd about them would be the same slip once more.
+    No points where a chain does not close: what else is odd about them would be the same fault once more.
     Vectors of the head begin at its axis next to the tool. "MRZP second" left out: both axes go through one point.
     """
     chains = names_of(form, table, head)

@@ -122,7 +122,7 @@ CAUSES = {"4000 for 40": ("GOTO/40,30", "GOTO/4000,30", "path.odd_record"),
           "a turned axis": ("GOTO/40,30,0", "GOTO/40,30,0,0.6,0,-0.8", "path.odd_record"),
           "fast": ("RPM,1000", "RPM,90000", "spindle.too_fast"), "no speed": ("RPM,1000", "RPM", "cl.form"),
           "a unit misspelt": ("MMPM,600", "MMPX,600", "cl.form"),
-          "a mark left": ("GOTO/40,30,0", "GOTO/40,$\nGOTO/40,30,0", "cl.continuation")}
+          "a mark left": ("GOTO/40,30,0", "GOTO/40,$", "cl.continuation")}
 
 
 @pytest.mark.parametrize("what", CAUSES)
