@@ -237,6 +237,9 @@ def as_text(result: PostResult, output: str, estimate: Estimate | None = None,
              *witness_lines(result.witness),
              f"tolerance: linearising {shares['linearising']:.4f}, control's smoothing {shares['smoothing']:.4f}, "
              f"rounding at most {shares['rounding']:.5f}{splines} mm"]
+    if result.options.smooth:
+        lines.append("--smooth: a control that rounds corners itself may take longer where points are moved; --optimise "
+                     "moves them only where its time gets less")
     if result.toolpath.records.total:
         lines.append(f"read: {result.toolpath.records}")
     fallen_back = any(found.code == "output.next_mode" for found in result.diagnostics)

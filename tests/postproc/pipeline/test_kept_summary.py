@@ -61,6 +61,13 @@ def test_all_is_kept_where_a_summary_works_on_the_path() -> None:
     assert not is_summed_up(job, replace(job.machine, dynamics=DynamicsModel()))
 
 
+def test_the_summary_says_that_moved_points_may_take_longer() -> None:
+    plain = made(*CASES[0])
+    smooth = replace(plain, options=replace(plain.options, smooth=True))
+    gained = set(as_text(smooth, "x").splitlines()) - set(as_text(plain, "x").splitlines())
+    assert len(gained) == 1 and "may take longer where points are moved" in gained.pop()
+
+
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case[0])
 def test_blocks_do_not_depend_on_how_many_moves_are_looked_at_together(case: tuple[str, str, str],
                                                                       monkeypatch: pytest.MonkeyPatch) -> None:
