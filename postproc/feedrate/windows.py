@@ -24,7 +24,7 @@ from toolpaths.compiled import available
 from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
-WINDOW, OVERLAP = 8192, 512
+WINDOW, OVERLAP = 4096, 512
 """Knots of a window, and on each side beyond it."""
 APART, OVER = 1e-3, 1.002
 """Relative difference of neighbours, and ratio to a limit in the blend, from which the overlap is widened."""
