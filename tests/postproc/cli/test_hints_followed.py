@@ -165,5 +165,5 @@ def test_a_file_that_is_far_larger_than_the_machine_has_no_odd_record(tmp_path: 
     assert got.stderr.count("[part]") + got.stderr.count("more travel") == 1, "one remedy"
     (tmp_path / "p.apt").write_text("\n".join([*START, *SQUARE, "FINI"]).replace("GOTO/40,", "GOTO/3000,"))
     got = run("convert", tmp_path / "p.apt", "-m", "mill-3axis", "-c", "linuxcnc", "-o", tmp_path / "p.ngc")
-    assert "no place of the part" in got.stderr and "more travel" in got.stderr
+    assert "wherever the part stands" in got.stderr and "more travel" in got.stderr
     assert "(part.origin)" not in got.stderr, "remedies do not contradict each other"
