@@ -222,7 +222,7 @@ class ActualBlockPoses(BlockPoses):
         if len(rows) * len(times) > AT_ONCE:
             return (self.joints(motion, rows, t) for t in times)
         every = self.joints(motion, np.tile(rows, len(times)), np.concatenate(times))
-        return iter(every.reshape(len(times), len(rows), -1))
+        return iter(every.reshape(len(times), len(rows), every.shape[1]))
 
     def _of(self, before: Floats, q: Floats) -> PlaySteps:
         step = np.nan_to_num((q - before)[:, self._bidirectional])
