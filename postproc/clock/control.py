@@ -173,13 +173,11 @@ def _run(part: Allowed, settings: ControlSettings, begin: Floats, share: float) 
     first = max(int(np.searchsorted(part.s, begin[0], side="right")) - 1, 0)
     part = part.between(first, len(part.s) - 1)
     s, v, a = part.s, np.empty(len(part.s)), np.empty(len(part.s))
-    bends = part.dq, part.d2q, part.d3q, settings.acceleration, settings.jerks, part.straight
-    gentle = (*bends[:3], share * settings.acceleration, share * settings.jerks, share * part.straight)
-    chosen(slow_down, len(s), COMPILE_FROM)(s, part.cap, *gentle, v, a)
+    chosen(slow_down, len(s), COMPILE_FROM)(s, part.cap, *_bends(part, settings, share), v, a)
     rough = float((np.diff(s) / np.maximum((v[1:] + v[:-1]) / 2.0, SLOWEST)).sum())
     if rough > LONGEST:
         raise ArithmeticError(f"the motion takes {rough:.3g} s")
-    loop, state, made = chosen(run, len(s), COMPILE_FROM), begin.copy(), []
+    loop, bends, state, made = chosen(run, len(s), COMPILE_FROM), _bends(part, settings, 1.0), begin.copy(), []
     while state[0] < s[-1] or state[1] > 0.0:
         out = np.empty((FEWEST + round(1.5 * rough / settings.cycle), 3))
         made.append(out[:loop(s, v, a, settings.cycle, *bends, state, out)])
@@ -190,6 +188,12 @@ def _run(part: Allowed, settings: ControlSettings, begin: Floats, share: float) 
         if len(made) > CALLS:
             raise ArithmeticError(f"no end is reached within {sum(map(len, made)) * settings.cycle:.3g} s")
     return np.concatenate(made)
+
+
+def _bends(part: Allowed, settings: ControlSettings, share: float) -> tuple[Floats, ...]:
+    """Derivatives of a part's path and a share of its limits, laid out alike whatever the share, so that loops are compiled
+    once."""
+    return part.dq, part.d2q, part.d3q, *(share * one for one in (settings.acceleration, settings.jerks, part.straight))
 
 
 def _jerk_used(part: Allowed, moved: Floats, settings: ControlSettings) -> Floats:

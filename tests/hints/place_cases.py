@@ -29,8 +29,8 @@ _REACH = [
             more=" --output-mode axes"),
     convert("place.found", START + CUT, r"\[part\] (origin = \[.*?\]), (x_axis = \[.*?\]), (y_axis = \[.*?\]) in the set-up",
             sheet("", r"[part]\n\1\n\2\n\3\n"), machine="haas-umc-750", control="haas-ngc", stops=("travel.exceeded",)),
-    convert("reach.clearance", START + CUT, r"\(part\.(origin)\)", sheet("190.0", "-60.0"), machine=DELTA,
-            setup=AT.format(z=190.0)),
+    convert("reach.clearance", START + CUT, r"\(part\.(origin)\)", sheet("60.0, 0.0, 190.0", "0.0, 0.0, -60.0"),
+            machine=DELTA, setup=LENGTH + "[part]\norigin = [60.0, 0.0, 190.0]\n"),
 ]
 FLAT = START + "RAPID\nGOTO/0,0,0\nGOTO/9,0,0\nRAPID\nGOTO/9,9,0\n"
 PLANAR = "planar-delta"

@@ -12,7 +12,7 @@ from postproc.job.job import Job
 from postproc.path.links import SafeSpace
 from postproc.path.model import ARC
 from postproc.readback.comparison.faults import Faults
-from postproc.readback.dialects.readers import reader_for
+from postproc.readback.dialects.readers import reader_for, smoothing_level
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import BlockPoses, arc_sweeps, coordinates
 from postproc.readback.text.canonical import SMOOTH_AXIS, SMOOTH_LEVEL, Canonical
@@ -203,8 +203,8 @@ def check_smoothing_levels(code: Canonical, motion: Motion, job: Job, moves: Mov
                            faults: Faults) -> list[Diagnostic]:
     """The level of the control's own smoothing while cutting is that of the blocks asked for, as the same reader reads them:
     an error in an operation of [output.smoothing], a warning in others, whose level no one stated."""
-    plan, reader = job.smoothing, reader_for(job.controller, job.machine.axis_names)
-    levels = {blocks: reader.smoothing_level(blocks) for blocks in {one.blocks for one in plan.used}}
+    plan, of = job.smoothing, (job.controller, job.machine.axis_names)
+    levels = {blocks: smoothing_level(*of, blocks) for blocks in {one.blocks for one in plan.used}}
     wanted = np.array([levels[one.blocks] for one in plan.used] or [np.nan])
     if np.isnan(wanted).all():
         return []
@@ -221,7 +221,7 @@ def check_smoothing_levels(code: Canonical, motion: Motion, job: Job, moves: Mov
             k = int(rows[bad.argmax()])
             result.append(report("verify.smoothing", f"the level of the control's smoothing is another than {by}",
                                  int(moves.line[owner[k]]), int(motion.line[k]), int(bad.sum()),
-                                 hint=reader.smoothing_hint))
+                                 hint=reader_for(*of).smoothing_hint))
     return result
 
 

@@ -187,8 +187,6 @@ class Reader(ABC):
 
     def smoothing_level(self, blocks: tuple[str, ...]) -> float:
         """The level that blocks of the controller file set the control's own smoothing to, NaN for none."""
-        if not blocks:
-            return float("nan")
         text = "\n".join(blocks).format(tolerance="1", chain="1", axis="1") + "\n"
         code, _ = self.read(self.alone.format(text))
         stated = np.zeros(0) if code is None else code.words.pick(SMOOTH_LEVEL)[1]
