@@ -15,6 +15,9 @@ TYPES: Mapping[str, tuple[type, ...]] = {
     "string": (str,), "integer": (int, np.integer), "number": (int, float, np.integer, np.floating),
     "boolean": (bool, np.bool_), "array": (list, tuple, np.ndarray), "object": (Mapping,), "null": (type(None),)}
 
+BEFORE = "convert"
+"""a job file is refused before its command begins, in the form of a refusal that all commands share"""
+
 
 def faults(schema: Mapping[str, Any], value: Any) -> list[str]:
     """Where a value is not as its schema says: types, constants, choices, keys that must be there, conditions."""
@@ -45,7 +48,7 @@ def install() -> None:
         found = headed(values, ok)
         context = get_current_context(silent=True)
         if context is not None:
-            command = context.command_path.partition(" ")[2]
+            command = context.command_path.partition(" ")[2] or BEFORE
             assert not (wrong := faults(result_schema(command), found)), f"postproc {command} --json: {wrong}"
         return found
 

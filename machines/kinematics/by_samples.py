@@ -84,7 +84,7 @@ def differences(seen: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     near, far = seen[k + 1] + seen[k - 1] - 2.0 * seen[k], seen[k + 2] + seen[k - 2] - 2.0 * seen[k]
     second = (16.0 * near - far) / (12.0 * h * h)
     step = np.diff(seen, n=3, axis=0) / h**3
-    sizes = np.linalg.norm(step.reshape(*step.shape[:2], -1, 3), axis=3).max(axis=0)
+    sizes = np.linalg.norm(step.reshape(*step.shape[:2], step.shape[2] // 3, 3), axis=3).max(axis=0)
     return seen[k], first, second, SAFETY * sizes
 
 

@@ -45,5 +45,5 @@ def foreign() -> str:
             other = spec.origin if spec is not None else "nothing"
             return (f"Python finds {other} in the place of the package {name} of postproc ({here / name}); "
                     "run it from another folder, or install postproc into an environment of its own "
-                    "(pipx install postproc, python -m venv)")
+                    "(pipx install WHEEL, or python -m venv and pip install WHEEL)")
     return ""

@@ -149,8 +149,8 @@ def client_of(where: Where, stack: ExitStack) -> Any:
     else:
         with _interrupts_ignored():
             cluster = stack.enter_context(library.LocalCluster(
-                n_workers=where.workers, threads_per_worker=1, processes=True, host="127.0.0.1", dashboard_address=None,
-                silence_logs=logging.CRITICAL))
+                n_workers=where.workers, threads_per_worker=1, processes=True, host="127.0.0.1",
+                dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False}, silence_logs=logging.CRITICAL))
         client = stack.enter_context(library.Client(cluster))
         client.register_plugin(_ignoring_interrupts())
     _same_version(client)

@@ -196,7 +196,7 @@ def report(diagnostics: tuple[Diagnostic, ...], target: str, values: dict[str, A
         unwritten = {"output": None} if "output" in values else {}
         values = values | unwritten | {"diagnostics": [d.as_dict() for d in diagnostics]}
         text, outputs = "", {}
-    more, failed = _written(target, _headed(values, ok), dict(outputs or {}))
+    more, failed = _written(target, _headed(values, ok) if target else {}, dict(outputs or {}))
     lines = lines_of((*diagnostics, *more), Severity.WARNING if SAYS.quiet else Severity.INFO)
     for line in ([SAYS.job_line] if SAYS.job_line and lines else []) + lines:
         typer.echo(readable(line), err=True)

@@ -69,8 +69,9 @@ def test_a_pool_whose_process_was_killed_is_ended_by_this_process(tmp_path: Path
 @contextmanager
 def two_workers() -> Iterator[None]:
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None,
-                                  silence_logs=50) as cluster, spread(Where(scheduler=cluster.scheduler_address)):
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", silence_logs=50,
+                                  dashboard_address="127.0.0.1:0", scheduler_kwargs={"dashboard": False}) as cluster, \
+            spread(Where(scheduler=cluster.scheduler_address)):
         assert isinstance(team_at_hand(), Cluster)
         yield
     assert team_at_hand() is None
