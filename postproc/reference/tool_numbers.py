@@ -97,10 +97,10 @@ def check_numbers(toolpath: Toolpath, report: Report) -> None:
             report(Severity.ERROR if named else Severity.WARNING, "tool.same_number", "different tools have the number "
                    f"{tool.number}: {_called(other[0])} and {_called(tool)}", other[1], hint)
         elif renamed := next((o for o in others if o[0].name and tool.name and o[0].name.upper() != tool.name.upper()), None):
+            hint = (f"cutting begins at lines {renamed[1]} and {line}; where they are two tools, "
+                    f"{_remedy(renamed[0], tool, _apart(renamed[0], tool, toolpath))}")
             report(Severity.WARNING, "tool.same_number", f"T{tool.number} has two names and one size: {_called(renamed[0])} "
-                   f"and {_called(tool)}; both cut as one tool", renamed[1],
-                   f"cutting begins at lines {renamed[1]} and {line}; where they are two, "
-                   f"{_remedy(renamed[0], tool, _apart(renamed[0], tool, toolpath))}")
+                   f"and {_called(tool)}; both cut as one tool", renamed[1], hint)
         others.append((tool, line))
 
 
