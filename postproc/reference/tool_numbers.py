@@ -96,7 +96,8 @@ def check_numbers(toolpath: Toolpath, report: Report) -> None:
             named = other[0].name or tool.name or other[0].shape or tool.shape
             report(Severity.ERROR if named else Severity.WARNING, "tool.same_number", "different tools have the number "
                    f"{tool.number}: {_called(other[0])} and {_called(tool)}", other[1], hint)
-        elif renamed := next((o for o in others if o[0].name and tool.name and o[0].name.upper() != tool.name.upper()), None):
+        elif renamed := next((o for o in others if o[0].name and tool.name and o[0].name.upper() != tool.name.upper()),
+                             None):
             hint = (f"cutting begins at lines {renamed[1]} and {line}; where they are two tools, "
                     f"{_remedy(renamed[0], tool, _apart(renamed[0], tool, toolpath))}")
             report(Severity.WARNING, "tool.same_number", f"T{tool.number} has two names and one size: {_called(renamed[0])} "

@@ -155,8 +155,8 @@ def _comment(b: ToolpathBuilder, s: Statement) -> None:
     text = s.body[arrow.end():].upper() if arrow else ""
     meant = re.split(r"[^A-Z]", text + " ")[0]
     if meant in _SAYING and (text[len(meant):].lstrip()[:1] or " ") in ("/" if _SAYING[meant] else "[{"):
-        b.log.error("cl.data-comment", f"$${s.body[:40]}: not a known remark; did you mean $$-> {meant}?", b.line,
-                    "correct the arrow ->, or leave it out before a comment", key=meant)
+        b.log.error("cl.data-comment", f"$${s.body[:40]}: not a known remark; did you mean $$-> {meant}?",
+                    b.line, "correct the arrow ->, or leave it out before a comment", key=meant)
     else:
         structure.comment(b, s)
 
