@@ -174,7 +174,9 @@ def _remark(b: ToolpathBuilder, s: Statement) -> None:
     heads = sorted({word, word + inner} - {""})
     meant = next((h if h in _SAYING else nearest(h, _SAYING) for h in heads if h in _SAYING or nearest(h, _SAYING)), "")
     joined = word.replace(" ", "")
-    meant = meant or (joined if joined in _SAYING else nearest(joined, _SAYING) if s.body else "") or _bodied(f"{word} {s.body}".strip())
+    if not meant:
+        meant = joined if joined in _SAYING else nearest(joined, _SAYING) if s.body else ""
+    meant = meant or _bodied(f"{word} {s.body}".strip())
     if meant:
         b.log.error("cl.data-comment", f"$$-> {word[:40]}: not a known remark; did you mean {meant}?", b.line,
                     "correct the word, or write $$ without -> before a comment", key=meant)
