@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import count
 
@@ -96,14 +96,30 @@ def check_numbers(toolpath: Toolpath, report: Report) -> None:
             named = other[0].name or tool.name or other[0].shape or tool.shape
             report(Severity.ERROR if named else Severity.WARNING, "tool.same_number", "different tools have the number "
                    f"{tool.number}: {_called(other[0])} and {_called(tool)}", other[1], hint)
+        elif renamed := next((o for o in others if o[0].name and tool.name and o[0].name.upper() != tool.name.upper()),
+                             None):
+            hint = (f"cutting begins at lines {renamed[1]} and {line}; where they are two tools, "
+                    f"{_remedy(renamed[0], tool, _apart(renamed[0], tool, toolpath))}")
+            report(Severity.WARNING, "tool.same_number", f"T{tool.number} has two names and one size: {_called(renamed[0])} "
+                   f"and {_called(tool)}; both cut as one tool", renamed[1], hint)
         others.append((tool, line))
+
+
+def _unused(toolpath: Toolpath) -> Iterator[int]:
+    """Numbers that no tool has and no record loads."""
+    taken = {t.number for t in toolpath.tools} | {int(numbers(e)[0]) for e in toolpath.events
+                                                  if e.word in TOOL_WORDS and numbers(e)}
+    return (n for n in count(1) if n not in taken)
+
+
+def _apart(kept: Tool, tool: Tool, toolpath: Toolpath) -> dict[str, int]:
+    """By name, numbers that keep two tools of one number apart."""
+    return {kept.name: kept.number, tool.name: next(_unused(toolpath))}
 
 
 def _own_numbers(toolpath: Toolpath, tools: list[Tool]) -> dict[str, int]:
     """By name, numbers that keep all different tools of one number apart: the first keeps it, the others get free ones."""
-    taken = {t.number for t in toolpath.tools} | {int(numbers(e)[0]) for e in toolpath.events
-                                                  if e.word in TOOL_WORDS and numbers(e)}
-    unused = (n for n in count(1) if n not in taken)
+    unused = _unused(toolpath)
     first: dict[int, Tool] = {}
     found: dict[str, int] = {}
     for tool in tools:

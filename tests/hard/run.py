@@ -43,7 +43,7 @@ SETUPS = (("h4a", "h4a.setup.toml"), ("delta", "delta.setup.toml"), ("uranesx", 
 with the file: a machine on legs reaches the place of `places` and hardly that of another machine"""
 PARTS, PLACES = Path(__file__).parent / "parts", Path(__file__).parent / "places"
 LONGEST = 900
-"""s that one conversion may take, edits included"""
+"""s of processor that one conversion may take, edits included"""
 PROVED, REFUSED, INTERNAL, ENDLESS, NUMBERS = "written and proved", "refused", "INTERNAL ERROR", "NO END", "number warning"
 REFUSES_MORE, NO_HINT = "AUTO REFUSES MORE", "READ-BACK WITHOUT A HINT"
 OUTPUT_MODES = ("axes", "tcp", "tilted")
@@ -81,11 +81,11 @@ def worked(task: Task) -> Counter[tuple[str, str, str]]:
         where = f"{task.file.name} on {task.machine}, {controller}"
         with warnings.catch_warnings(record=True) as noise:
             warnings.simplefilter("always")
-            signal.signal(signal.SIGALRM, _endless)
-            signal.alarm(LONGEST)
+            signal.signal(signal.SIGPROF, _endless)
+            signal.setitimer(signal.ITIMER_PROF, LONGEST)
             for kind, detail, more in _outcomes(task, controller):
                 found[kind, detail, where + more] += 1
-            signal.alarm(0)
+            signal.setitimer(signal.ITIMER_PROF, 0)
         for w in noise:
             found[NUMBERS, f"{Path(w.filename).name}:{w.lineno} {w.message}", where] += 1
     return found
@@ -119,7 +119,7 @@ def _outcomes(task: Task, controller: str) -> Iterator[tuple[str, str, str]]:
             timed(program, result, result.machine, result.controller, controller)
             yield (f"edited: {'proved' if verified(program, result) else 'refused'}", "", step)
     except Endless:
-        yield ENDLESS, f"within {LONGEST} s", step
+        yield ENDLESS, f"within {LONGEST} s of processor", step
     except Exception as fault:
         trace = fault.__traceback__
         while trace is not None and trace.tb_next is not None:

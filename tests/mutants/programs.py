@@ -8,6 +8,7 @@ control, with the part off the rotary axes and tools of different lengths.
 from __future__ import annotations
 
 import random
+import sys
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -118,4 +119,5 @@ def all_programs(only: str = "", count: int = EACH) -> list[Found]:
             found = apart(lambda name=name: judged(name, count), 1800)
             assert not isinstance(found, str), f"{name}: {found}"
             result.append(found)
+            print(f"{name}: {found.count} changes, {len(found.survivors)} survivors", file=sys.stderr, flush=True)
     return result

@@ -19,7 +19,9 @@ from tests.mutants.plant import Fault, NotPlanted, functions, planted
 from tests.mutants.rooms import BESIDE, cases_of, files_asked, proves
 
 SECONDS = 60
-"""s that a process may take"""
+"""s of processor that a process may take: a busy machine does not make a fault one that has no end"""
+IDLE = 20
+"""times as long by the clock, for what waits and never works"""
 EDITS = 24
 """changed programs that a reader with a fault is asked about"""
 
@@ -44,14 +46,20 @@ class Outcome:
         return self.caught_by == "survives" or unexplained or (self.caught_by == "blind" and not self.test)
 
 
-def apart(work: Callable[[], Any], seconds: int = SECONDS) -> Any:
+def limit(seconds: float) -> None:
+    """Ends this process after so many seconds of processor, or `IDLE` times as many by the clock; 0: no limit."""
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    signal.setitimer(signal.ITIMER_REAL, IDLE * seconds)
+
+
+def apart(work: Callable[[], Any], seconds: float = SECONDS) -> Any:
     """What `work` gives in a process of its own; an exception, or no end, as a text."""
     sys.stdout.flush()
     read, write = os.pipe()
     child = os.fork()
     if child == 0:
         os.close(read)
-        signal.alarm(seconds)
+        limit(seconds)
         try:
             found = pickle.dumps(work())
         except BaseException as fault:
@@ -107,7 +115,7 @@ def outcomes(faults: list[Fault], bench: Bench, tests: bool = True, jobs: int = 
 
 
 def _some(faults: list[Fault], bench: Bench, tests: bool) -> list[Outcome]:
-    signal.alarm(0)
+    limit(0)
     result = []
     for fault in faults:
         result.append(outcome(fault, bench, tests))
@@ -204,7 +212,7 @@ def _tests(fault: Fault) -> str:
 
     first = First()
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-    signal.alarm(3 * SECONDS)
+    limit(3 * SECONDS)
     with planted(fault):
         pytest.main(["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist",
                      *(f"tests/{name}" for name in files_asked(fault.room))], plugins=[first])

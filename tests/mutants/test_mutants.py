@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 
 import pytest
@@ -11,6 +12,7 @@ from tests.mutants.judge import change, converted, made, short, verified
 from tests.mutants.plant import Fault, NotPlanted, place_of, planted, spoilt
 from tests.mutants.programs import picked
 from tests.mutants.rooms import BATTERY, FAULTS, cases_of, files_asked
+from tests.mutants.run import apart
 
 NAMED = {f.name: f for f in FAULTS}
 SEVEN = {"MSYS ignored": "flat linuxcnc", "arcs in the other sense": "milled", "cycle depth + 1 mm": "flat fanuc",
@@ -45,6 +47,16 @@ def test_every_room_has_faults() -> None:
     wanted = {*BATTERY, *(f"writer of {c}" for c in SIX), *(f"reader of {c}" for c in SIX)}
     assert set(rooms) == wanted
     assert min(rooms.values()) >= 2, rooms
+
+
+def test_a_fault_has_no_end_by_its_own_work_and_not_by_that_of_others() -> None:
+    """A process may wait for a busy machine; one that works on, or never works, is ended."""
+    def work() -> None:
+        while True:
+            pass
+    assert apart(lambda: time.sleep(0.1), 0.05) is None
+    assert apart(work, 0.05) == "no end within 0.05 s"
+    assert apart(lambda: time.sleep(5.0), 0.01) == "no end within 0.01 s"
 
 
 @pytest.mark.parametrize(("function", "old"), [

@@ -128,6 +128,8 @@ HANDLERS.update({"DEFSUB": defsub, "CALSUB": calsub, "ENDSUB": structure.nothing
 _SAYING = {**dict.fromkeys((w.removeprefix(DATA_COMMENT) for w in HANDLERS if w.startswith(DATA_COMMENT)), 0),
            "CSYS": 12, "CUTTER": 1, "FEATNO": 1, "USE": 2, "SPLINE": 1, "CUBIC": 1}
 """`$$->` remarks that say something, with the count of their numbers; 0: lists of our own writer"""
+_ARROW = re.compile(r"\s*\S?\s*(?:-\S?|\S?>)\s*(?=[A-Za-z])")
+"""`->` with one sign of it changed, lost or added, and `$$` before it"""
 _FIRST = re.compile(r"[^A-Z]*([A-Z]+)(?![A-Z])")
 VOCABULARY = frozenset(HANDLERS) | UNSUPPORTED_MOTION
 """Every word the reader has an answer to"""
@@ -147,6 +149,21 @@ def _other(b: ToolpathBuilder, s: Statement) -> None:
         b.texts.append((b.line, s.major))
 
 
+def _comment(b: ToolpathBuilder, s: Statement) -> None:
+    """A comment, unless a damaged byte of its arrow makes one of a `$$->` remark that says something."""
+    arrow = _ARROW.match(s.body)
+    text = s.body[arrow.end():].upper() if arrow else ""
+    meant = re.split(r"[^A-Z]", text + " ")[0]
+    if meant in _SAYING and (text[len(meant):].lstrip()[:1] or " ") in ("/" if _SAYING[meant] else "[{"):
+        b.log.error("cl.data-comment", f"$${s.body[:40]}: not a known remark; did you mean $$-> {meant}?",
+                    b.line, "correct the arrow ->, or leave it out before a comment", key=meant)
+    else:
+        structure.comment(b, s)
+
+
+HANDLERS["$$"] = _comment
+
+
 def _remark(b: ToolpathBuilder, s: Statement) -> None:
     """A `$$->` remark that nobody reads is a comment, unless it is what a damaged byte leaves of one that
     says something: its word is one edit from that word, or that word stands with a body in its form and no slash between."""
@@ -157,7 +174,9 @@ def _remark(b: ToolpathBuilder, s: Statement) -> None:
     heads = sorted({word, word + inner} - {""})
     meant = next((h if h in _SAYING else nearest(h, _SAYING) for h in heads if h in _SAYING or nearest(h, _SAYING)), "")
     joined = word.replace(" ", "")
-    meant = meant or (joined if joined in _SAYING else "") or _bodied(f"{word} {s.body}".strip())
+    if not meant:
+        meant = joined if joined in _SAYING else nearest(joined, _SAYING) if s.body else ""
+    meant = meant or _bodied(f"{word} {s.body}".strip())
     if meant:
         b.log.error("cl.data-comment", f"$$-> {word[:40]}: not a known remark; did you mean {meant}?", b.line,
                     "correct the word, or write $$ without -> before a comment", key=meant)
@@ -171,7 +190,7 @@ def _bodied(text: str) -> str:
         return ""
     rest = text[first.end():].lstrip()
     body = words_of(rest)
-    if len(body) > 1 and isinstance(body[0], str) and len(body[0]) == 1:
+    if len(body) > 1 and isinstance(body[0], str) and len(body[0]) <= 1:
         body = body[1:]
     whole = len(body) >= numbers > 0 and all(isinstance(w, float) for w in body)
     return first[1] if whole or (numbers == 0 and rest[:3].lstrip()[:1] in ("{", "[") and rest) else ""

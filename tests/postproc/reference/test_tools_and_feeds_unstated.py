@@ -120,6 +120,17 @@ def test_two_tools_of_one_number_are_refused_and_the_set_up_is_named() -> None:
     assert '[tool_numbers]\n"EM12" = 1\n"EM6" = 2' in said(converted(TWO), "tool.number").hint
 
 
+@pytest.mark.parametrize("second", ["CUTTER/12,0\nTPRINT/T2 FINISHER", "CUTTER/12,0\nTPRINT/T2 FINISHER\nLOADTL/1"])
+def test_a_second_name_under_one_number_and_size_is_said(second: str) -> None:
+    """Nothing but the name tells two tools apart: they cut as one, which may be what the file means, or a lost LOADTL."""
+    text = f"UNITS/MM\nCUTTER/12,0\nTPRINT/T1 ROUGHER\nLOADTL/1\nSPINDL/RPM,2500,CLW\nFEDRAT/MMPM,400\n{CUT}{second}\n{CUT}"
+    found = said(converted(text), "tool.same_number")
+    assert found.severity is Severity.WARNING and '"T1 ROUGHER" = 1\n"T2 FINISHER" = 2' in found.hint
+    two = converted(text, of=setup(tool_numbers={"T1 ROUGHER": 1, "T2 FINISHER": 2}))
+    assert two.ok and [n for n in (1, 2) if f"T{n} M6" in two.text] == [1, 2]
+    assert all("names" not in d.message for d in converted(text.replace("T2 FINISHER", "t1 rougher")).diagnostics)
+
+
 @pytest.mark.parametrize("controller", ["linuxcnc", "fanuc-30i", "siemens-840d", "heidenhain-tnc640"])
 def test_the_set_up_numbers_tools_by_name(controller: str, tmp_path: Path) -> None:
     of = setup(tool_numbers=NAMES)

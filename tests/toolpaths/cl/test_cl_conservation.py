@@ -114,7 +114,8 @@ def test_a_word_of_the_shop_is_taken_as_it_stands_where_it_is_allowed(word: str)
 
 
 @pytest.mark.parametrize("line", [
-    "$$ see drawing 7/8", "$$ CUTTER / 10 as drawn", "$$*TLAXIS/0,0,1", "$$ ---- CSYS ----", "PPRINT SPEED 1/2",
+    "$$ see drawing 7/8", "$$ - CUTTER of 10", "$$ -- TOOL / 4 --", "$$ CUTTER / 10 as drawn",
+    "$$*TLAXIS/0,0,1", "$$ ---- CSYS ----", "PPRINT SPEED 1/2",
     "REMARK MACHID=MACHIN / X",
     "$$-> SETSTART / 5", "$$ DOORSTOP", "PPRINT/MOTION,CUT,TYPE", "INSERT/[HOLDER=C40] 20.0mm DRILL",
 ])
@@ -124,7 +125,10 @@ def test_comments_and_texts_of_real_files_pass(line: str) -> None:
 
 @pytest.mark.parametrize(("record", "code"), [
     ("O)STOP", "cl.text"), ("OP)STOP", "cl.text"), ("SPINDL/RPM,3000,C\xdfLW", "cl.form"),
-    ("LOADTL / 1, OSETNO, 19$$-> CUTTER / 10.500000", "cl.data-comment")])
+    ("LOADTL / 1, OSETNO, 19$$-> CUTTER / 10.500000", "cl.data-comment"), ("GOTO/0,0,2\nENDFINI", "cl.unknown-word"),
+    *((text, "cl.data-comment") for text in (
+        "$$;-> FEATNO / 10", "$$> CUTTER / 10.5", "$$-X CUTTER / 10.5", '$$x>TOOL {"number": 1}',
+        "$$-> CUTTER , 10.5", "$$->E CUTTER / 10.5"))])
 def test_what_a_byte_leaves_of_a_record_is_refused(record: str, code: str) -> None:
     """A bracket within a word, a letter that is none of ASCII, a remark on the line of a record."""
     found = read_bytes("\n".join(["UNITS/MM", "LOADTL/1", record, "GOTO/0,0,1", "FINI", ""]), file="part.apt").diagnostics

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from toolpaths.cl.text.near import nearest
-from toolpaths.cl.text.words import SILENT, TEXT_WORDS
+from toolpaths.cl.text.words import BARE_WORDS, SILENT, TEXT_WORDS
 from toolpaths.pattern import pattern
 
 SINGLE = pattern(r"[A-Z0-9_-]*[A-Z][A-Z0-9_-]*")
@@ -53,4 +53,6 @@ def _resembles(text: str, vocabulary: frozenset[str]) -> bool:
              "".join(words[:2]), " ".join(words[:2])} - {""}
     if upper.startswith(TEXT_WORDS) or heads & vocabulary:
         return True
+    if any(h.startswith(w) and h[len(w):] in vocabulary for h in heads for w in BARE_WORDS):
+        return True  # two records, the end of the line between them lost
     return any(len(h) >= _SHORTEST and nearest(h, vocabulary) for h in heads)
