@@ -31,7 +31,7 @@ FROM_FILES = {
     "machines/slider_models.py": "names of LinuxCNC's modules"}
 """texts that others wrote; what is made of them is a Literal"""
 WORDS_OF_FILES = {"Event.word", "Statement.major", "Statement.body", "Record.major", "Record.body", "DialectStatement.name",
-                  "Instance.name", "Word.letter"}
+                  "Instance.name", "Word.letter", "KinematicsRow.axis"}
 """fields that hold them"""
 OTHERS = {
     ("machines/value_words.py", "kind"): "pydantic's names of faults",

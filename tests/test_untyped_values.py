@@ -33,7 +33,8 @@ BORDERS = {
     "machines/figures.py": TABLES, "machines/toml_lines.py": TABLES, "machines/user_file.py": TABLES,
     "toolpaths/dataclass.py": "what a field of any class holds",
     "postproc/base/given.py": "what a caller gives, before its type is known",
-    "machines/user_model.py": SCHEMA, "postproc/python/calls.py": FIGURES,
+    "machines/user_model.py": SCHEMA, "postproc/cli/shared/schemas.py": SCHEMA,
+    "postproc/cli/machines_controllers.py": SCHEMA, "postproc/python/calls.py": FIGURES,
     "machines/exchange/draft.py": TABLES, "machines/sheet/file_text.py": TABLES,
     "machines/value_words.py": "what pydantic says of a fault",
     **{f"machines/{name}.py": FIGURES for name in (

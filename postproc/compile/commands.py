@@ -187,7 +187,7 @@ class _Writing:
         return self.state.again(event.line, but)
 
     def _selects_nothing(self, event: Event) -> bool:
-        """True for SELECT/TOOL,0 before a change to a tool: an empty place made ready calls for no tool on the way there."""
+        """True for SELECT/TOOL,0 before a change to a tool: an empty place made ready calls for no tool before it."""
         return numbers(event)[:1] == [0.0] and self.to_come[:1] != [0]
 
     def _loads(self, at: int, event: Event) -> bool:

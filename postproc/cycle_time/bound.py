@@ -5,7 +5,7 @@ between two grid points d2q is 0, so that one backward and one forward pass over
 x = v^2. Corners cost nothing, and what a control may cut off at them within its tolerance is taken off the
 lengths. On arcs each axis may give all it has in every direction.
 
-Where jerk is limited, rests cost more (`rest_ramps`). Whatever a control does on the way, an axis that has to be D from
+Where jerk is limited, rests cost more (`rest_ramps`). Whatever a control does in between, an axis that has to be D from
 where it rested takes at least the time that it takes alone at its jerk, acceleration and speed; so does the path along
 the first straight block. A stretch from rest to rest takes that up to one place, its second-order time from there to
 another, whose speeds no motion exceeds, and the same backward from the next rest: the largest such sum.
@@ -132,7 +132,7 @@ def reaches(blocks: MotionBlocks, form: Shape, model: CycleTimeModel) -> tuple[F
     return np.where((blocks.path[:-1] == CornerMode.BLEND) & ~blocks.forced[:-1], reach, 0.0), cosine
 
 
-class Stretches(NamedTuple):
+class FromRestToRest(NamedTuple):
     """Rows of the first and last block of each stretch (S,) from rest to rest, and the stretch of each block (E,)."""
 
     first: Ints
@@ -165,7 +165,7 @@ def rest_ramps(blocks: MotionBlocks, form: Shape, model: CycleTimeModel, seconds
     """
     first = np.flatnonzero(np.append(True, rests[:-1]))
     last = np.append(first[1:], len(blocks)) - 1
-    some = Stretches(first, last, np.repeat(np.arange(len(first)), last - first + 1))
+    some = FromRestToRest(first, last, np.repeat(np.arange(len(first)), last - first + 1))
     share, axes = form.share, blocks.axes
     fastest = np.zeros((len(first), share.shape[1]))
     np.maximum.at(fastest, some.of, share * lent[:, None])
@@ -216,7 +216,7 @@ def _slowest(travel: Floats, most: Floats, acceleration: Floats, jerk: Floats, l
     return np.asarray(np.where(moves, found, 0.0).max(axis=1, initial=0.0))
 
 
-def _together(ahead: Floats, behind: Floats, some: Stretches) -> Floats:
+def _together(ahead: Floats, behind: Floats, some: FromRestToRest) -> Floats:
     """(S,) the most that a ramp from rest up to the end of block k and one to rest from the begin of block m > k on give."""
     room = 1.0 + float(np.abs(ahead).max(initial=0.0))
     begun = np.maximum.accumulate(np.maximum(ahead, 0.0) + room * some.of) - room * some.of

@@ -74,7 +74,7 @@ class ControlClock:
         return self._time(result, planner.quick(), False, blocks, sampled(blocks, planner.of_machine(result.machine)).times)
 
     def least(self, result: PostResult) -> float:
-        """s where the control had the whole tolerance for itself, whatever the program's points use of it: no way of sharing
+        """s where the control had the whole tolerance for itself, whatever the program's points use of it: no sharing of
         it is faster. 0 where more tolerance need not make a control faster."""
         planner = _model(result, self.model)
         if planner.kind != "linuxcnc":

@@ -157,7 +157,8 @@ class Eased:
         return np.clip(s, self.first, np.nextafter(self.last, self.first))
 
     def chained(self, sigma: Floats, s: Floats, inner: Derivatives) -> Derivatives:
-        """Derivatives by sigma from those by s; s (4, N) as of `parameter`. In the place of `inner` where that may be changed."""
+        """Derivatives by sigma from those by s; s (4, N) as of `parameter`. Written over
+        `inner` where that may be changed."""
         bent = np.flatnonzero((sigma < self.ease) | (sigma > self.end - self.ease))
         if not len(bent):
             return inner

@@ -236,7 +236,7 @@ def rotate(b: ToolpathBuilder, s: Statement) -> None:
 
 
 def _unknown_turn(s: Statement, old: float, turn: float, added: bool) -> str:
-    """What is not known of an angle that adds to the table's or states it, or of the way round CLW to a stated one; ""
+    """What is not known of an angle that adds to the table's or states it, or of the direction CLW to a stated one; ""
     where all readings turn the table alike."""
     other = turn if added else -turn if s.has("CLW") else turn
     position = old + turn if added else turn
