@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ from postproc.report.loads import deflection, deflection_lines, motor_load, moto
 from postproc.report.places import place_lines, places
 from postproc.report.unwinding import unwinding, unwinding_lines
 from postproc.verification.proof_text import statement
-from postproc.witness.evidence import Testimony
+from postproc.witness.evidence import Compared, Testimony
 from toolpaths.arrays import distinct, finite
 from toolpaths.diagnostics import Severity
 from toolpaths.input_files import there_is
@@ -163,7 +164,12 @@ def witness_lines(said: Testimony | None) -> list[str]:
     """What the second witness has compared, for people."""
     if said is None or not said.compared or said.findings:
         return []
-    return [f"second witness agrees: {', '.join(map(str, said.compared))}"]
+    return [f"second witness agrees: {', '.join(map(_compared, said.compared))}"]
+
+
+def _compared(one: Compared) -> str:
+    what = {"work offset": "work offsets", "cutter compensation": "states of cutter compensation"}.get(one.what, one.what)
+    return f"{one.count} {re.sub(r's(?= of| and|$)', '', what, count=1) if one.count == 1 else what}"
 
 
 def _seconds(value: float | None) -> str:
@@ -264,7 +270,9 @@ def as_text(result: PostResult, output: str, estimate: Estimate | None = None,
         lines.append(text(estimate))
     lines += result.optimised.lines() if result.optimised else []
     lines += result.feed_times.lines() if result.feed_times else []
-    lines.append("axes: " + ", ".join(f"{k} {_places(lo)} to {_places(hi)}" for k, (lo, hi) in d["axis_extents"].items()))
+    modulo = [] if result.job is None else [result.machine.axis_names[j] for j in result.job.control.rolls]
+    lines.append("axes: " + ", ".join(f"{k} {_places(lo)} to {_places(hi)}{' all turns together (modulo)' * (k in modulo)}"
+                                      for k, (lo, hi) in d["axis_extents"].items()))
     if d["geometric_errors"] is not None and d["geometric_errors"]["corrected_by"] == "control":
         lines.append(f"geometric errors {d['geometric_errors']['model']}: left to the control, not corrected here")
     if result.compensation is not None:

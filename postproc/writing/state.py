@@ -168,10 +168,15 @@ class WriterState:
         return values if self.program.letters[axis] in ROTARY else np.asarray(values / self.controller.unit)
 
     def share(self, length: float) -> str:
-        """A length that the control's smoothing may take, mm, in the units of the program, rounded down in inches."""
+        """A length that the control's smoothing may take, mm, in the units of the program: in inches rounded down to its
+        decimals, or finer where nothing would be left."""
         if self.controller.unit == 1.0:
             return self.plain(length)
-        return self.plain(math.floor(length / self.controller.unit * SHARE + 1e-6) / SHARE)
+        value = length / self.controller.unit
+        for step in (10.0**self.controller.format.linear_decimals, SHARE):
+            if (steps := math.floor(value * step + 1e-6)) > 0:
+                return self.plain(steps / step)
+        return self.plain(value)
 
     def columns(self, at: int, stop: int) -> list[WordColumn] | None:
         """The axis words of blocks at..stop as numbers; None where some are said otherwise."""
@@ -319,7 +324,7 @@ class WriterState:
 
 
 SHARE = 1e6
-"""steps in an inch that a share of the tolerance is rounded down to"""
+"""steps in an inch that a share of the tolerance is rounded down to where the control's decimals leave nothing"""
 _REST = 0.005
 """mm that are no peck of their own"""
 SPEED_DIGITS = 3

@@ -44,7 +44,9 @@ PLANES = {frozenset("XY"): 17.0, frozenset("XZ"): 18.0, frozenset("YZ"): 19.0}
 _TCPM = {"F", "TCP", "AXIS", "POS", "PATHCTRL", "REFPNT", "TIP-TIP"}
 _UNCOMPENSATED = {"PLANE SPATIAL", "PLANE RESET", "FUNCTION TCPM", "FUNCTION RESET TCPM", "M128", "M129"}
 """before these radius compensation is cancelled (iTNC 530 manual; TOOL CALL, cycles 19 and 32 too)"""
-_PLANE = {"TURN", "MOVE", "STAY", "FMAX", "F", "MAX", "TABLE", "COORD", "ROT", "SYM+", "SYM-", "SEQ+", "SEQ-"}
+_PLANE = re.compile(r"(?: (?:TURN|MOVE)(?: (?:DIST|ABST)[-+]?[\d.]+)?(?: F\+?[\d.]+| F ?MAX)| STAY)(?: (?:SYM|SEQ)[-+])?"
+                    r"(?: (?:TABLE|COORD) ROT)?")
+"""what stands behind the angles of a plane: how the rotary axes come there is stated, and TURN and MOVE with their feed"""
 _CHOICES: dict[str, RotaryDirection] = {"SYM+": "+", "SYM-": "-", "SEQ+": "+", "SEQ-": "-"}
 
 
@@ -340,11 +342,12 @@ class KlartextRun:
 
     def plane(self, b: int, s: DialectStatement) -> None:
         """PLANE SPATIAL SPA SPB SPC."""
-        strange = {str(a) for a in s.args if not re.match(r"(SP[ABC]|DIST|ABST|F)[-+]?\d", str(a))} - _PLANE
-        if strange or not {"SPA", "SPB", "SPC"} <= set(s.keys) or s.keys.get("DIST", 0.0) != 0.0:
-            what = ", ".join(sorted(strange)) or "a part of its angles, or DIST"
-            self.fault("gcode.mode", b, f"PLANE SPATIAL with {what}",
-                       "PLANE SPATIAL SPA SPB SPC TURN FMAX TABLE ROT")
+        rest = "".join(f" {a}" for a in s.args if not re.fullmatch(r"SP[ABC][-+]?[\d.]+", str(a)))
+        if not {"SPA", "SPB", "SPC"} <= set(s.keys) or not _PLANE.fullmatch(rest) \
+                or any(s.keys.get(key, 0.0) != 0.0 for key in ("DIST", "ABST")):
+            self.fault("gcode.mode", b, f"PLANE SPATIAL ...{rest or ' without TURN, MOVE or STAY'}",
+                       "PLANE SPATIAL SPA SPB SPC, then TURN or MOVE with F or FMAX, or STAY, then SYM+ or SYM-, then "
+                       "TABLE ROT or COORD ROT, DIST 0")
             return
         rotation = turned("XYZ", [s.keys[k] for k in ("SPA", "SPB", "SPC")], fixed=True)
         asked: RotaryDirection = next((_CHOICES[str(a)] for a in s.args if str(a) in _CHOICES), "nearest")

@@ -53,6 +53,16 @@ def test_the_reader_knows_the_names(controller: str, old: str, new: str, code: s
     assert not [d for d in read_back(same.encode(), result.job, "test.apt")[1] if d.severity is Severity.ERROR]
 
 
+@pytest.mark.parametrize("controller", NAMED)
+def test_a_number_in_the_place_of_a_name_is_refused(controller: str) -> None:
+    result = good(called(controller, "EM10_ROUGH", "BM6"))
+    assert result.job is not None
+    text = re.sub(r'T="BM6"|"BM6"', lambda call: call[0].replace('="BM6"', "2").replace('"BM6"', "2"), result.text)
+    found = [d for d in read_back(text.encode(), result.job, "test.apt")[1] if d.severity is Severity.ERROR]
+    [line] = [d.lines for d in found if d.code == "gcode.tool_name" and "tool 2 is called by its number" in d.message]
+    assert all(re.search(r"\bT2$|TOOL (CALL|DEF) 2\b", text.splitlines()[n - 1]) for n in line)
+
+
 def test_a_program_by_names_needs_the_set_up() -> None:
     named, bare = good(called("siemens-840d", "EM10_ROUGH", "BM6")), good(called("siemens-840d", ""))
     assert bare.job is not None

@@ -177,7 +177,9 @@ def test_labels_behind_the_end_and_other_files() -> None:
     ("CYCL DEF 208 BORE ~\n Q200=2", "gcode.cycle"), ("CALL LBL 77", "gcode.subprogram"), ("L X+1 X+2", "gcode.repeated"),
     ("PLANE RESET TURN FMAX", "gcode.mode"), ("FUNCTION TCPM F CONT AXIS POS PATHCTRL AXIS", "gcode.mode"),
     ("FUNCTION TCPM F TCP AXIS POS PATHCTRL VECTOR", "gcode.mode"), ("PLANE SPATIAL SPA+0 SPB+0 TURN FMAX", "gcode.mode"),
-    ("PLANE SPATIAL SPA+0 SPB+0 SPC+0 STAY R1", "gcode.mode"), ("L X+1 R1 F100", "gcode.unknown_word"),
+    *((f"PLANE SPATIAL SPA+0 SPB+0 SPC+0{rest}", "gcode.mode") for rest in (
+        "", " STAY R1", " FMAX", " TURN", " MOVE TABLE ROT", " TURN FMAX TABLE", " TURN FMAX ROT", " STAY MOVE FMAX",
+        " TURN ABST5 FMAX")), ("L X+1 R1 F100", "gcode.unknown_word"),
     ("L X+1 R1 F100 M128", "gcode.syntax"), (CENTRED.format("Q396"), "gcode.cycle"),
     ("CYCL DEF 32.2 HSC-MODE:2", "gcode.smoothing")])
 def test_what_is_not_modelled_is_an_error_with_its_line(block: str, code: str) -> None:
