@@ -11,6 +11,7 @@ from machines.calibration.folded_names import folded, near
 from machines.calibration.machine_fit import SETUP, MachineFit, MeasuredQuantity, Measurements, fit
 from machines.calibration.measurement_file import COLUMNS, BarModel, LaserModel, PosesModel, TableColumn
 from machines.calibration.outcome import MEANT, CalibrationOutcome, done, uncertain
+from machines.calibration.quiet_columns import quiet_columns
 from machines.calibration.result_figures import account, weighted
 from machines.calibration.run import CalibrationRun, approach_column
 from machines.calibration.unit_and_sign_checks import machine_table_fault
@@ -164,6 +165,8 @@ def _judged(run: CalibrationRun, given: PosesModel | BarModel | LaserModel, star
     travel = run.machine.limits.lower, run.machine.limits.upper
     columns = [c.name for c in COLUMNS[run.kind]]
     units, joints = ([table.unit[name] for name in names] for names in (columns, run.machine.axis_names))
+    column = np.arange(len(result.residuals)) % len(columns)
+    quiet_columns(run, result, np.broadcast_to(measured.sigma, measured.read.shape).ravel(), column, columns, units)
     return done(run, fitted.model, figures, result.noise, {"sigma_um": given.sigma_um},
                 lambda: machine_table_fault(start, kinematics, measured, wanted, travel, units, joints, columns), start,
                 wanted)

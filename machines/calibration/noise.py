@@ -74,8 +74,8 @@ class Noise:
         return float(lost * (more * stdtrit(self.freedom, 0.975) / NORMAL) ** 2)
 
 
-def noise_of(weighted: Floats, unknowns: int, robust: bool = False) -> Noise | None:
-    """Of weighted residuals (R,) of a fit of so many unknowns; None where no reading is to spare."""
+def noise_of(weighted: Floats, unknowns: float, robust: bool = False) -> Noise | None:
+    """Of weighted residuals (R,) of a fit that takes so many degrees of freedom; None where no reading is to spare."""
     spare = len(weighted) - unknowns
     if spare <= 0:
         return None

@@ -53,7 +53,7 @@ class CalibrationProblem:
 
 
 @dataclass(frozen=True, eq=False)
-@arrays(values="P", sigma="P", covariance="P P", residuals="R", weights="R")
+@arrays(values="P", sigma="P", covariance="P P", residuals="R", weights="R", leverage="R")
 class CalibrationResult:
     """What a fit gives.
 
@@ -68,6 +68,7 @@ class CalibrationResult:
         not_identifiable: groups of names of which only combinations are known
         residuals: (R,) observed less predicted
         weights: (R,) 1, less where a robust fit mistrusts a reading
+        leverage: (R,) degrees of freedom that the fit takes of each reading, their sum the rank
     """
 
     names: tuple[str, ...]
@@ -82,6 +83,7 @@ class CalibrationResult:
     not_identifiable: tuple[tuple[str, ...], ...]
     residuals: Floats
     weights: Floats
+    leverage: Floats
     noise: Noise | None = None
     scale: float = 1.0
 
@@ -118,7 +120,7 @@ def solve(problem: CalibrationProblem, robust: bool = False) -> CalibrationResul
     sigma[[k for k, name in enumerate(problem.names) if name in lost]] = np.inf
     costs = _cost(start, problem, weights), _cost(residual, problem, weights)
     return CalibrationResult(problem.names, values, sigma, covariance, converged, *costs, decomposed.rank,
-                             decomposed.condition_number, groups, residual, weights, noise, scale)
+                             decomposed.condition_number, groups, residual, weights, decomposed.leverage, noise, scale)
 
 
 def _cost(residual: Floats, problem: CalibrationProblem, weights: Floats) -> float:
@@ -148,6 +150,12 @@ class _Decomposed:
         """Largest by smallest singular value; inf below full rank."""
         count = int(self.free.sum())
         return float(self.s[0] / self.s[count - 1]) if self.rank == count and count else float("inf") if count else 1.0
+
+    @property
+    def leverage(self) -> Floats:
+        """(R,) diagonal of the projector on what the parameters can do to the readings."""
+        result: Floats = np.sum(self.u[:, : self.rank] ** 2, axis=1)
+        return result
 
     def step(self, residual: Floats) -> Floats:
         """The smallest (scaled) change that fits best."""

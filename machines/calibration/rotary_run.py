@@ -7,6 +7,7 @@ import numpy as np
 from machines.calibration.folded_names import folded
 from machines.calibration.measurement_file import COLUMNS, ReversalModel, RotaryMeasurementModel
 from machines.calibration.outcome import CalibrationOutcome, done
+from machines.calibration.quiet_columns import quiet_columns
 from machines.calibration.result_figures import (
     CalibrationFigures,
     account,
@@ -108,6 +109,8 @@ def rotary(run: CalibrationRun, given: RotaryMeasurementModel, table: CsvTable) 
         run.note("calibrate.hidden",
                  f"an error of the mounting has the same effect as {', '.join(fitted.lost)}; they are 0 in the model")
     model = error_model(fitted, given.axis, sense=sense, carries_part=_carries_part(run, given.axis))
+    column = np.flatnonzero(np.isfinite(readings)) % len(PARTS)
+    quiet_columns(run, fitted.result, sigma[column], column, PARTS, [table.unit[p] for p in PARTS])
     return done(run, model, figures, fitted.result.noise,
                 {"sigma_um": given.sigma_um, "sigma_arcsec": given.sigma_arcsec},
                 lambda: rotary_table_fault(bench, readings, sigma, given.harmonics, [table.unit[p] for p in PARTS]))

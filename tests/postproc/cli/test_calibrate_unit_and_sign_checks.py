@@ -132,6 +132,8 @@ SLIPS = {
                                         "ex, ey, ez in arcsec (write [arcsec]"),
     "six, places tenfold": ("rotary.csv", scaled(10.0, "dx", "dy", "dz"), "calibrate.slip", "dx, dy, dz a tenth as large"),
     "six, ez tenfold": ("rotary.csv", scaled(10.0, "ez"), "calibrate.slip", "ez a tenth as large"),
+    "six, ez alone in arcsec under urad": ("rotary.csv", text("ez [arcsec]", "ez [urad]"), "calibrate.slip",
+                                           "with ez in arcsec (write [arcsec]"),
     "steps backwards": ("rotary.csv", rows(lambda r: r.update(step=(12.0 - r["step"]) % 12.0)), "calibrate.slip",
                         "steps counted in the other direction"),
     "set-ups backwards": ("rotary.csv", rows(lambda r: r.update(setup=2.0 - r["setup"])), "calibrate.slip",
