@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -160,6 +159,13 @@ def witness_dict(said: Testimony | None) -> dict[str, Any] | None:
                                       "worst_axis_deg": finite(said.worst_axis / DEG), "seconds": said.seconds}
 
 
+_ONE = {"positions": "position", "arcs": "arc", "holes": "hole", "feeds": "feed", "work offsets": "work offset",
+        "states of cutter compensation": "state of cutter compensation", "rests and stops": "rest or stop",
+        "turns of modulo axes": "turn of modulo axes", "clamps": "clamp", "curves": "curve",
+        "turns of tools about themselves": "turn of a tool about itself"}
+"""what is compared, where it is one"""
+
+
 def witness_lines(said: Testimony | None) -> list[str]:
     """What the second witness has compared, for people."""
     if said is None or not said.compared or said.findings:
@@ -169,7 +175,7 @@ def witness_lines(said: Testimony | None) -> list[str]:
 
 def _compared(one: Compared) -> str:
     what = {"work offset": "work offsets", "cutter compensation": "states of cutter compensation"}.get(one.what, one.what)
-    return f"{one.count} {re.sub(r's(?= of| and|$)', '', what, count=1) if one.count == 1 else what}"
+    return f"{one.count} {_ONE.get(what, what) if one.count == 1 else what}"
 
 
 def _seconds(value: float | None) -> str:

@@ -30,6 +30,6 @@ CASES = [*CL, *IMPORTS, *CL_WORDS, *MACHINE, *TOOLS, *CONVERT, *GCODE, *ERRORS, 
          *OWN_ROOMS, *MACROS, *BATCH, *DESIGN, *PACKAGES, *CALIBRATION, *RARE, *PASSED_ON, *PASSED_LATE, *ORIENT]
 _NUMBERED = {f"{case.code}-{k}": case for k, case in enumerate(CASES)}
 OF_MACHINES = {name: case for name, case in _NUMBERED.items()
-               if case.command.split()[0] in ("machine", "errors", "calibrate")}
+               if case.command.split()[0] in ("machine", "errors", "calibrate", "orient", "time")}
 OF_PROGRAMS = {name: case for name, case in _NUMBERED.items() if name not in OF_MACHINES}
 """by their names"""

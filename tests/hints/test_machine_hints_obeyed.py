@@ -1,4 +1,4 @@
-"""The law of hints for commands about machines, their errors and calibrations; the law is in `test_hints_obeyed.py`."""
+"""The law of hints for commands about machines, errors, calibrations, times, axes; it is in `test_hints_obeyed.py`."""
 
 from __future__ import annotations
 

@@ -356,7 +356,7 @@ def _feeds(b: ToolpathBuilder, rows: PointRows, kind: Array) -> tuple[Floats, Ar
 def _turning(b: ToolpathBuilder, rows: PointRows, column: Ints) -> set[int]:
     """Operations that are turning: by a word for it, or by a surface speed where no tool axis leans."""
     n = len(rows)
-    leans = set(np.unique(column[np.abs(rows.axis[:, :2]).max(axis=1) > AXIS_AGREES]).tolist())
+    leans = set(distinct(column[np.abs(rows.axis[:, :2]).max(axis=1) > AXIS_AGREES]).tolist()) if b.surface_speed else set()
 
     def of(marks: set[tuple[int, int]]) -> set[int]:
         return {int(column[row]) if row < n else op for op, row in marks}
