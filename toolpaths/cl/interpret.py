@@ -128,7 +128,7 @@ HANDLERS.update({"DEFSUB": defsub, "CALSUB": calsub, "ENDSUB": structure.nothing
 _SAYING = {**dict.fromkeys((w.removeprefix(DATA_COMMENT) for w in HANDLERS if w.startswith(DATA_COMMENT)), 0),
            "CSYS": 12, "CUTTER": 1, "FEATNO": 1, "USE": 2, "SPLINE": 1, "CUBIC": 1}
 """`$$->` remarks that say something, with the count of their numbers; 0: lists of our own writer"""
-_ARROW = re.compile(r"\s*\S?\s*(?:-\S?|\S?>)\s*(?=[A-Za-z])")
+_ARROW = re.compile(r"\s*(?:\S\s*->|-\S>|->\S|-\S?|\S?>)\s*(?=[A-Za-z])")
 """`->` with one sign of it changed, lost or added, and `$$` before it"""
 _FIRST = re.compile(r"[^A-Z]*([A-Z]+)(?![A-Z])")
 VOCABULARY = frozenset(HANDLERS) | UNSUPPORTED_MOTION

@@ -115,7 +115,7 @@ def test_a_word_of_the_shop_is_taken_as_it_stands_where_it_is_allowed(word: str)
 
 @pytest.mark.parametrize("line", [
     "$$ see drawing 7/8", "$$ - CUTTER of 10", "$$ -- TOOL / 4 --", "$$ CUTTER / 10 as drawn",
-    "$$*TLAXIS/0,0,1", "$$ ---- CSYS ----", "PPRINT SPEED 1/2",
+    "$$*TLAXIS/0,0,1", "$$ ---- CSYS ----", "$$ --- CSYS / WORLD ---", "PPRINT SPEED 1/2",
     "REMARK MACHID=MACHIN / X",
     "$$-> SETSTART / 5", "$$ DOORSTOP", "PPRINT/MOTION,CUT,TYPE", "INSERT/[HOLDER=C40] 20.0mm DRILL",
 ])
