@@ -12,7 +12,7 @@ from machines.calibration.noise import CHANCE, Noise, noise_of
 from machines.calibration.outcome import FEW, SILENT
 from machines.calibration.problem import CalibrationResult
 from machines.calibration.run import CalibrationRun
-from machines.geometric_error.tables.csv_table import ANGLES, LENGTHS
+from machines.geometric_error.tables.csv_table import other_units
 from toolpaths.arrays import Bools, Floats, Ints
 
 ACCEPT = "where it is read so much finer, accept_residual = true at the top of the file, or --accept-residual"
@@ -35,7 +35,7 @@ def quiet_columns(run: CalibrationRun, result: CalibrationResult, sigma: Floats,
             continue
         message = (f"what is left of {name} is {noise.left:.3g} times its stated standard deviation, of all readings "
                    f"{result.noise.left:.3g} times")
-        explained = _units_that_explain(noise, unit)
+        explained = [other for other, size in other_units(unit).items() if noise.scaled(size).meets]
         if explained and not run.checked.accept_residual:
             run.problem("calibrate.slip", message, f"with {name} in {' or '.join(explained)} (write [{explained[0]}] in the "
                         f"header) its stated noise would be left; {ACCEPT}")
@@ -47,8 +47,3 @@ def _noise_of_column(result: CalibrationResult, sigma: Floats, of: Bools) -> Noi
     """What a column leaves; the fit takes as many degrees of freedom of it as its readings have leverage."""
     weighted = result.residuals[of] / sigma[of]
     return noise_of(weighted, float(result.leverage[of].sum()), bool((result.weights < 1.0).any()))
-
-
-def _units_that_explain(noise: Noise, unit: str) -> list[str]:
-    known = LENGTHS if unit in LENGTHS else ANGLES
-    return [other for other in known if other != unit and noise.scaled(known[other] / known[unit]).meets]

@@ -22,7 +22,7 @@ from machines.calibration.reversal import identify, reversal_span
 from machines.calibration.rotary_bench import PARTS, Bench
 from machines.calibration.rotary_fit import rotary_span
 from machines.geometric_error.actual.model import ErrorModel
-from machines.geometric_error.tables.csv_table import ANGLES, LENGTHS
+from machines.geometric_error.tables.csv_table import LENGTHS, other_units
 from machines.kinematics.base import Kinematics
 from toolpaths.arrays import Floats
 
@@ -167,8 +167,7 @@ def _changed(table: Floats, columns: Sequence[str],
 
 def _sizes(what: str, unit: str) -> list[tuple[Remedy, float]]:
     """Other units that numbers under `unit` may be in, and what they are larger by."""
-    known = LENGTHS if unit in LENGTHS else ANGLES
-    return [*((Remedy("unit", what, other), size / known[unit]) for other, size in known.items() if other != unit),
+    return [*((Remedy("unit", what, other), size) for other, size in other_units(unit).items()),
             *((Remedy(change, what), size) for change, size in TENFOLD.items())]
 
 

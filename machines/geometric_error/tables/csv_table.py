@@ -34,6 +34,12 @@ _HEAD = re.compile(r"(?P<name>[^\[\]()]+?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?$")
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 
 
+def other_units(unit: str) -> dict[str, float]:
+    """Other units that numbers under `unit` may be in, and what they are larger by."""
+    known = LENGTHS if unit in LENGTHS else ANGLES
+    return {other: size / known[unit] for other, size in known.items() if other != unit}
+
+
 @dataclass(frozen=True)
 class CsvTable:
     """Columns by name, mm and rad; `unit` as written ("" for none), `lines` (N,) the 1-based line of each row."""
