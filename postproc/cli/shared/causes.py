@@ -14,7 +14,7 @@ PLACED = frozenset({"travel.exceeded", "reach.axis", "reach.position", "link.blo
 _MOVE, _LOWER = "move the part in the set-up (part.origin)", "lower clearance.margin"
 _SHORTER = "use a shorter tool (gauge_length)"
 WITHOUT_MOVE = {_MOVE: "", f"{_MOVE}, or {_LOWER}": _LOWER, f"{_MOVE}, turn it, or {_LOWER}": _LOWER,
-                f"{_MOVE}, {_LOWER}, or {_SHORTER}": f"{_LOWER}, or {_SHORTER}"}
+                f"{_MOVE}, {_LOWER}, or {_SHORTER}": f"{_LOWER}, or {_SHORTER}", f"{_MOVE}, or {_SHORTER}": _SHORTER}
 """remedies of travel and reach, and what is left of each where no place of the part fits"""
 FOLLOWS = {"cl.no-feed": ("feed.missing", "cl.feed", "convert.turning"), "cl.no-units": ("cl.empty", "convert.turning"),
            "cl.rapid-below": ("cl.cycle-depth",),
