@@ -13,6 +13,7 @@ from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.joints.tracks import TRAVEL_SLACK
 from postproc.path.model import ARC, JointPath
 from postproc.reference.moves import Moves
+from postproc.setup.model import LOWER
 from toolpaths.arrays import Floats, Ints, distinct
 from toolpaths.diagnostics import Diagnostic, error
 from toolpaths.toolpath import Kind
@@ -60,9 +61,10 @@ def _arc_extremes(path: JointPath, law: Control, k: Ints, at_start: Floats, low:
 
 
 def check_travel(path: JointPath, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
-                 file: str = "", where: Callable[[Ints], str] = lambda moves: "",
+                 file: str = "", where: Callable[[Ints], str] = lambda moves: "", lower: str = LOWER[-1],
                  ) -> tuple[list[Diagnostic], dict[str, tuple[float, float]]]:
-    """(excesses as errors, extents of each axis in mm or degrees); `where` says at which place moves (K,) are made."""
+    """(excesses as errors, extents of each axis in mm or degrees); `where` says at which place moves (K,) are made,
+    `lower` what brings linking moves down."""
     machine, limits = control.machine, control.machine.limits
     lowest, highest = np.full(len(limits.lower), np.inf), np.full(len(limits.lower), -np.inf)
     beyond: list[tuple[Ints, Floats, Floats]] = []
@@ -81,7 +83,7 @@ def check_travel(path: JointPath, moves: Moves, control: Control, kinematics: Ca
         bad = over > TRAVEL_SLACK
         if bad.any():
             diagnostics.append(_excess(path, moves, control, j, rows[bad], low[bad, j], high[bad, j], over[bad], file,
-                                       where(path.move[rows[bad]]), kinematics))
+                                       where(path.move[rows[bad]]), kinematics, lower))
     return diagnostics, extents
 
 
@@ -120,7 +122,7 @@ def _shorter_helps(kinematics: Kinematics, q: Floats, j: int, over: float) -> bo
 
 
 def _excess(path: JointPath, moves: Moves, control: Control, j: int, bad: Ints, low: Floats, high: Floats, over: Floats,
-            file: str, where: str, kinematics: Callable[[int], Kinematics]) -> Diagnostic:
+            file: str, where: str, kinematics: Callable[[int], Kinematics], lowering: str) -> Diagnostic:
     """Axis j goes beyond its travel in the blocks `bad` (K,), to `low`, `high`, by `over` (K,), at a place."""
     machine = control.machine
     rotary = machine.rotary[j]
@@ -137,7 +139,7 @@ def _excess(path: JointPath, moves: Moves, control: Control, j: int, bad: Ints, 
     if rotary:
         hint = "turn the part in the set-up, or split the operation"
     else:
-        others = ["lower clearance.margin"] if linking else []
+        others = [lowering] if linking else []
         if _shorter_helps(kinematics(int(moves.tool[path.move[worst]])), path.q[worst], j, float(over[at])):
             others.append("use a shorter tool (gauge_length)")
         hint += "".join(f", {'or ' * (k + 1 == len(others))}{one}" for k, one in enumerate(others))

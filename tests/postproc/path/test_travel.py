@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 import machines
 from postproc.cli.app import app
+from postproc.cli.shared.causes import WITHOUT_MOVE
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile
 from tests.postproc.kit import NX, circle, codes, convert, execute, goto, machine, sample, tilted, toolpath
@@ -122,6 +123,17 @@ def test_a_shorter_tool_is_advised_where_the_tool_has_a_length(length: float | N
     result = convert(toolpath("RAPID", "GOTO/0,0,390", "GOTO/1,0,390", "RAPID", "GOTO/1,0,420"), "mill-3axis", setup=setup)
     hints = [d.hint for d in result.diagnostics if d.code == "travel.exceeded"]
     assert hints and all(("shorter tool" in hint) == advised for hint in hints)
+
+
+@pytest.mark.parametrize(("clearance", "advice"), [({"distance": 700.0}, "lower clearance.distance"),
+                                                   ({"centre": (0, 0, 900)}, "put clearance.centre nearer to the part"),
+                                                   ({}, "lower clearance.margin")])
+def test_the_key_that_brings_links_down_is_the_one_in_force(clearance: dict[str, object], advice: str) -> None:
+    setup = SetupFile.model_validate({"clearance": clearance, "tools": {"1": {"gauge_length": 250.0}}})
+    result = convert(toolpath("RAPID", "GOTO/0,0,100", "GOTO/1,0,149"), "mill-3axis", setup=setup)
+    hints = [d.hint for d in result.diagnostics if d.code == "travel.exceeded"]
+    assert hints and all(advice in hint for hint in hints)
+    assert all("move the part" not in WITHOUT_MOVE[hint] and advice in WITHOUT_MOVE[hint] for hint in hints)
 
 
 def test_rotary_travel_in_degrees() -> None:
