@@ -112,8 +112,30 @@ def _calling_compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     return made
 
 
+@cache
+def _without_scipy() -> None:
+    """numba loads what it knows of numpy without SciPy, which it looks for there and needs for matrices alone: a quarter of a
+    second of every command that compiles, and 30 MB. A loop with a product of matrices still finds it."""
+    import numba.np.linalg as linalg
+
+    def absent() -> None:
+        raise ImportError
+
+    own = cast(Any, linalg)
+    known = own.ensure_blas
+    own.ensure_blas = absent
+    try:
+        import numba.np.arraymath as arraymath
+
+        cast(Any, arraymath)._HAVE_BLAS = True
+    finally:
+        own.ensure_blas = known
+
+
 def _by_numba(function: Callable[..., Any], how: Loop) -> Callable[..., Any]:
     from numba import njit, types
+
+    _without_scipy()
 
     def argument(kind: str, dimensions: int) -> Any:
         number = getattr(types, kind)

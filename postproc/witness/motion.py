@@ -91,9 +91,7 @@ class Walked:
         for first in range(0, len(rows), CHUNK):
             k = rows[first:first + CHUNK]
             i, (start, start_axis) = self.owner[k], self.start(k)
-            middle = self.poses.at(k, 0.5)
-            for tip, axis in (middle, (self.tip[k], self.axis[k])):
-                d, a = off(self.targets, i, tip, axis, start, start_axis)
+            for d, a in off(self.targets, i, (self.poses.at(k, 0.5), (self.tip[k], self.axis[k])), start, start_axis):
                 self.away[k] = np.fmax(self.away[k], np.nan_to_num(d, nan=np.inf))
                 self.tilt[k] = np.fmax(self.tilt[k], np.nan_to_num(a, nan=np.inf))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -118,10 +119,10 @@ def matched(targets: Targets, tip: Array, axis: Array, turns: Array, tolerance: 
 def turns_of(poses: Poses) -> Array:
     """(E, 3) rotation vectors of the blocks that are arcs, in the table frame; 0 for others."""
     e = poses.executed
-    result = np.zeros((len(e), 3))
     rows = np.flatnonzero((e.code == 2) & np.isfinite(e.sweep))
     if not len(rows):
-        return result
+        return np.broadcast_to(0.0, (len(e), 3))
+    result = np.zeros((len(e), 3))
     part = np.minimum(0.25, 0.5 * np.pi / np.maximum(np.abs(e.sweep[rows]), 1e-12))
     points = []
     for share in (0.0, 1.0, 2.0):
@@ -141,9 +142,15 @@ def _pose_of(poses: Poses, rows: Array, q: Array, t: Array) -> Array:
     return poses.executed.poses_at(rows, t)[0]
 
 
-def off(targets: Targets, i: Array, tip: Array, axis: Array, start: Array, start_axis: Array) -> tuple[Array, Array]:
-    """(mm, rad) (K,) by which poses are off the path to the targets `i` (K,) from `start`: a line or an arc,
-    and the great circle of the axes."""
+def off(targets: Targets, i: Array, poses: Sequence[tuple[Array, Array]], start: Array,
+        start_axis: Array) -> list[tuple[Array, Array]]:
+    """(mm, rad) (K,) by which each of some poses (K, 3) is off the path to the targets `i` (K,) from `start`: a line or an
+    arc, and the great circle of the axes."""
+    tilts = _from_circle([axis for _, axis in poses], start_axis, targets.axis[i])
+    return [(_away(targets, i, tip, start), tilt) for (tip, _), tilt in zip(poses, tilts, strict=True)]
+
+
+def _away(targets: Targets, i: Array, tip: Array, start: Array) -> Array:
     away = from_line(tip, start, targets.tip[i])
     round_ = np.flatnonzero(targets.sweep[i] != 0.0)
     if len(round_):
@@ -153,7 +160,7 @@ def off(targets: Targets, i: Array, tip: Array, axis: Array, start: Array, start
     for target in np.unique(i).tolist() if targets.splines else ():
         if target in targets.splines:
             away[i == target] = off_chords(tip[i == target], targets.splines[target])
-    return away, _from_circle(axis, start_axis, targets.axis[i])
+    return away
 
 
 def from_line(tip: Array, start: Array, end: Array) -> Array:
@@ -184,18 +191,20 @@ def _from_arc(tip: Array, start: Array, end: Array, centre: Array, normal: Array
     return best
 
 
-def _from_circle(axis: Array, first: Array, last: Array) -> Array:
-    """(K,) rad from the great circle between two directions."""
+def _from_circle(axes: Sequence[Array], first: Array, last: Array) -> list[Array]:
+    """(K,) rad of each of some directions (K, 3) from the great circle between two."""
     square = np.cross(first, last)
     size = np.sqrt(np.einsum("ni,ni->n", square, square))
-    ends = np.minimum(_angle(axis, first), _angle(axis, last))
+    found = [np.minimum(_angle(axis, first), _angle(axis, last)) for axis in axes]
     if not (size > 1e-9).any():
-        return ends
+        return found
     pole = square / np.where(size > 1e-9, size, 1.0)[:, None]
-    inside = (np.einsum("ni,ni->n", np.cross(pole, first), axis) >= 0.0) & (
-        np.einsum("ni,ni->n", np.cross(last, pole), axis) >= 0.0)
-    aside = np.abs(np.arcsin(np.clip(np.einsum("ni,ni->n", pole, axis), -1.0, 1.0)))
-    return np.where((size > 1e-9) & inside, np.minimum(aside, ends), ends)
+    behind, before = np.cross(pole, first), np.cross(last, pole)
+    for axis, ends in zip(axes, found, strict=True):
+        inside = (np.einsum("ni,ni->n", behind, axis) >= 0.0) & (np.einsum("ni,ni->n", before, axis) >= 0.0)
+        aside = np.abs(np.arcsin(np.clip(np.einsum("ni,ni->n", pole, axis), -1.0, 1.0)))
+        np.copyto(ends, np.minimum(aside, ends), where=(size > 1e-9) & inside)
+    return found
 
 
 def _angle(a: Array, b: Array) -> Array:

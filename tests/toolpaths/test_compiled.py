@@ -125,3 +125,13 @@ def test_marking_loops_does_not_load_the_compiler() -> None:
             "import postproc.correction.backlash_steps_loop\n"
             "import toolpaths.compiled as c; assert 'numba' not in sys.modules")
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+@pytest.mark.numeric
+@pytest.mark.slow  # make numeric
+def test_the_compiler_loads_no_scipy_and_finds_it_where_matrices_are_multiplied() -> None:
+    code = ("import sys, numpy, numba, toolpaths.compiled as c\n"
+            "c.compiled(c.loop(lambda x: x + 1.0))(1.0); assert 'scipy.linalg' not in sys.modules\n"
+            "assert numba.njit(lambda a: numpy.dot(a, a))(numpy.eye(2))[1, 1] == 1.0 and 'scipy.linalg' in sys.modules\n"
+            "numba.njit(lambda a: numpy.cov(a))(numpy.eye(2))")
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)

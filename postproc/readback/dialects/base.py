@@ -229,15 +229,15 @@ class Reader(ABC):
         code, found = self.canonical(text, line, file)
         words, more = unrolled(code.words, line, self.axes, self.rolls, self.home, self.turn_codes, file)
         kept = self.controller is not None and self.controller.feed.kept_by_units
-        return replace(code, words=self.cooled(self.stopped(words)), feed_kept=kept), [*found, *more]
+        words = added(words, [*self.stopped(words), *self.cooled(words)])
+        return replace(code, words=words, feed_kept=kept), [*found, *more]
 
-    def stopped(self, words: Words) -> Words:
-        """The words with the blocks before which the control itself has stopped the spindle."""
-        return words if self.stop == "nothing" else added(words,
-                                                          [(b, STANDS, 1.0) for b in _behind_stops(words)])
+    def stopped(self, words: Words) -> list[tuple[int, str, float]]:
+        """(block, letter, value) of the blocks before which the control itself has stopped the spindle."""
+        return [] if self.stop == "nothing" else [(b, STANDS, 1.0) for b in _behind_stops(words)]
 
-    def cooled(self, words: Words) -> Words:
-        """The words with what flows from each block on that switches coolant, in the order of the codes: a
+    def cooled(self, words: Words) -> list[tuple[int, str, float]]:
+        """The same of what flows from each block on that switches coolant, in the order of the codes: a
         tool change acts before the codes of its block, a stop behind them."""
         blocks, numbers = codes(words, "M", tuple(self.switches))
         events = [(int(b), 1, *self.switches[float(m)]) for b, m in zip(blocks, numbers, strict=True)]
@@ -249,7 +249,7 @@ class Reader(ABC):
         for block, _, on, off in sorted(events, key=lambda e: e[:2]):
             flowing = flowing & ~off | on
             new.append((block, COOLANT, float(flowing)))
-        return added(words, new)
+        return new
 
     def units(self, code: Canonical, file: str) -> list[Diagnostic]:
         """Axis words before any code says whether they are mm."""

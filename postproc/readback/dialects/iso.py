@@ -73,6 +73,7 @@ class IsoReader(Reader):
         self.others(words, new, drop, line, file, found)
         words = self.arcs(relative_words(words, self.axes), new, drop)
         found += self.numbers(words.take(~drop), line, file)
+        self._stated = None  # its words would stay with it
         return Canonical(added(words, new, drop), line), found
 
     def own_smoothing(self, words: Words) -> tuple[Words, New]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from postproc.control.control import InterpolationMode
 from postproc.readback.text.words import Words
-from toolpaths.arrays import Bools, Floats, Ints, among
+from toolpaths.arrays import Array, Bools, Floats, Ints, among
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic
 from toolpaths.shapes import arrays
@@ -183,8 +183,19 @@ def added(words: Words, new: list[tuple[int, str, float]], drop: Bools | None = 
     new = sorted(new, key=lambda n: n[0])
     line = np.array([n[0] for n in new], dtype=np.int64)
     behind = np.searchsorted(kept.line, line, side="right")
-    return Words(np.insert(kept.letter, behind, np.array([ord(n[1]) for n in new], dtype=np.uint8)),
-                 np.insert(kept.value, behind, [n[2] for n in new]), np.insert(kept.line, behind, line), words.lines)
+    letter, value = np.array([ord(n[1]) for n in new], dtype=np.uint8), np.array([n[2] for n in new], dtype=np.float64)
+    return Words(*(_between(old, behind, more) for old, more in (
+        (kept.letter, letter), (kept.value, value), (kept.line, line))), words.lines)
+
+
+def _between(values: Array, behind: Ints, new: Array) -> Array:
+    """`numpy.insert` of values behind so many others (ascending), whole stretches at a time, which a mask of all takes five
+    times as long for."""
+    made, at = np.empty(len(values) + len(new), dtype=values.dtype), 0
+    for k, stop in enumerate(behind.tolist()):
+        made[at + k:stop + k], made[stop + k], at = values[at:stop], new[k], stop
+    made[at + len(new):] = values[at:]
+    return made
 
 
 def offset_number(code: str) -> float:

@@ -28,6 +28,8 @@ _ARGUMENTS = {"G": [ord(a) for a in "PQRLEIJK"], "M": [ord(a) for a in "PQRLE"],
 """words that belong to a code which is no macro call: no axis, feed, speed, tool or register"""
 _PART = 200_000
 """words that are looked at together"""
+_RARE = 20
+"""blocks to a statement, from which on a state is written stretch by stretch"""
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,10 @@ def fill(lines: Array, values: Array, count: int, initial: float) -> Floats:
     """(count + 1,) the value stated last at or before each block."""
     if not len(lines):
         return repeated(float(initial), count + 1)
+    if len(lines) < count // _RARE and (lines[1:] >= lines[:-1]).all():
+        known = np.append(lines[1:] != lines[:-1], True) & np.isfinite(values)
+        begins = np.concatenate([[0], lines[known], [count + 1]])
+        return np.repeat(np.append(float(initial), values[known]), np.diff(begins))
     result = np.full(count + 1, np.nan)
     result[0] = initial
     result[lines] = values

@@ -6,6 +6,8 @@ Fundamentals, DC, ACP, ACN; Heidenhain, M126 and M127. Before the first word of 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from postproc.control.rollover import LEAST, TURN, Rollover
@@ -53,8 +55,7 @@ def unrolled(words: Words, line: Ints, axes: tuple[str, ...], rolls: dict[int, R
         found += _faults(axis, rule, half, axes[j], roll, line, file)
         value = value.copy() if value is words.value else value
         value[here] = np.where(axis.relative, axis.value, position)
-    point = words.point[keep] if words.point is not None else None
-    return Words(words.letter[keep], value[keep], words.line[keep], words.lines, point), found
+    return replace(words, value=value).take(keep), found
 
 
 def _rules(words: Words, axis: _Axis, letter: str, roll: Rollover, by_codes: bool) -> Array:
