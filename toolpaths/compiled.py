@@ -114,8 +114,8 @@ def _calling_compiled(function: Callable[..., Any]) -> Callable[..., Any]:
 
 @cache
 def _without_scipy() -> None:
-    """numba loads what it knows of numpy without SciPy, which it looks for there and needs for matrices alone: a quarter of a
-    second of every command that compiles, and 30 MB. A loop with a product of matrices still finds it."""
+    """numba loads what it knows of numpy without SciPy, which it looks for there and needs for matrices alone: 0.2 s and
+    20 MB of every command that compiles. A loop with a product of matrices still finds it."""
     import numba.np.linalg as linalg
 
     def absent() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -107,6 +107,11 @@ class Commanded:
 
     def __len__(self) -> int:
         return len(self.tip)
+
+    def without_poses(self) -> Commanded:
+        """The same with NaN in the place of tips and axes, which a long file has no room for twice."""
+        unknown = np.broadcast_to(np.nan, (len(self), 3))
+        return replace(self, tip=unknown, axis=unknown)
 
 
 def unit(v: Array) -> Array:

@@ -118,8 +118,7 @@ def check_path(w: Walked, lines: Array, cut: Cut | None, margin: float, link_ang
     where they are dog-legs (`bent`) they may be fed if the set-up asks for that; `flat`: none has to be clear, they go
     straight from cut to cut, or by home."""
     good = w.on_path()
-    step = np.diff(w.tip, axis=0, prepend=w.tip[:1])
-    moved = np.sqrt(np.einsum("ni,ni->n", step, step))
+    moved = np.append(np.zeros(1), apart(w.tip[1:], w.tip[:-1]))[:len(w.tip)]
     cutting, rapid = is_cut(w.kind) & ~w.gap & ~w.returns, is_rapid(w.kind) & ~w.gap
     found = []
     hurried = cutting & good & (w.code == 0) & (moved > STILL) & (w.kind != BOTTOM)

@@ -169,21 +169,23 @@ def cut_of(case: Case, c: Commanded, tip: Array, axis: Array, centre: Array, nor
     if len(holes):
         depth = np.array([x.depth for x in c.cycles])[c.cycle[holes]]
         points.append(tip[holes] - np.nan_to_num(depth)[:, None] * axis[holes])
-    rows = np.flatnonzero(c.known & (c.arc >= 0))
-    rows = rows[rows > 0]
-    if len(rows):
-        k = c.arc[rows]
+    arcs = np.flatnonzero(c.known & (c.arc >= 0))
+    arcs = arcs[arcs > 0]
+    if len(arcs):
+        k = c.arc[arcs]
         for share in np.linspace(0.05, 0.95, 19):
-            points.append(on_arc(tip[rows - 1], tip[rows], centre[k], normal[k], c.sweep[k], share))
-    every = np.concatenate(points)
-    every = every[np.isfinite(every).all(axis=1)]
+            points.append(on_arc(tip[arcs - 1], tip[arcs], centre[k], normal[k], c.sweep[k], share))
+    some = [rows[np.isfinite(rows).all(axis=1)] for rows in points if len(rows)]
+    every = some[0] if len(some) == 1 else np.concatenate([tip[:0], *some])
+    del points, some
     if not len(every):
         return None
     corners = _box(every.min(axis=0), every.max(axis=0))
     given, stock = case.setup.get("clearance", {}).get("centre"), (case.setup.get("rewind") or {}).get("stock")
     middle = 0.5 * (corners[0] + corners[-1]) if given is None else place[0] @ np.array(given, np.float64) + place[1]
     whole = [corners, _box(stock["low"], stock["high"]) @ place[0].T + place[1]] if stock else [corners]
-    return Cut(corners, middle, float(np.sqrt(((every - middle) ** 2).sum(axis=1).max())), np.concatenate(whole))
+    far = max(((every[first:first + CHUNK] - middle) ** 2).sum(axis=1).max() for first in range(0, len(every), CHUNK))
+    return Cut(corners, middle, float(np.sqrt(far)), np.concatenate(whole))
 
 
 def _box(low: Array, high: Array) -> Array:

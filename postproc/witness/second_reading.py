@@ -16,11 +16,11 @@ from postproc.witness.errors import ErrorChain, error_chain
 from postproc.witness.evidence import Aspect, Case, Compared, ExecutedBlocks, Finding, NotCompared, Testimony
 from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged
 from postproc.witness.motion import Walked, check_arcs, check_path
-from postproc.witness.place import Poses, Unplaced, cut_of, placement, zero_of
+from postproc.witness.place import Cut, Poses, Unplaced, cut_of, placement, zero_of
 from postproc.witness.sides import check_sides
 from postproc.witness.splines import check_curves
 from postproc.witness.states import check_feeds, check_holes, check_states, check_velocities, with_spindle
-from postproc.witness.stretches import BOTTOM, is_cut, matched, targets_of, turns_of
+from postproc.witness.stretches import BOTTOM, Targets, is_cut, matched, targets_of, turns_of
 from postproc.witness.text import Array
 from postproc.witness.turning import check_turning
 
@@ -54,7 +54,9 @@ def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
                                    if case.errors else "no machine file of a known kind: poses of the read-back"))
     poses = Poses(case, executed, machine, [], max(int(tools_of(c, case.setup).max(initial=0)), 0))
     with np.errstate(all="ignore"):
-        found, worst, counts, silent = _compare(case, executed, c, place, poses, table)
+        targets, cut = _targets(case, c, place)
+        c = c.without_poses()
+        found, worst, counts, silent = _compare(case, executed, c, place, targets, cut, poses, table)
     compared = tuple(Compared(what, n) for what, n in counts.items() if n)
     return Testimony(compared, (*missing, *silent), tuple(found), int(c.known.sum()), *worst, process_time() - began)
 
@@ -114,8 +116,8 @@ def _nothing(why: str, began: float, missing: Sequence[NotCompared] = ()) -> Tes
     return Testimony((), (NotCompared("all", why), *missing), seconds=process_time() - began)
 
 
-def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Array, Array], poses: Poses,
-             table: dict[str, object]) -> tuple[list[Finding], tuple[float, float], dict[Aspect, int], list[NotCompared]]:
+def _targets(case: Case, c: Commanded, place: tuple[Array, Array]) -> tuple[Targets, Cut | None]:
+    """What the program has to come to, and what is cut, in the table frame."""
     rotation, origin = place
     turn, same = np.ascontiguousarray(rotation.T), bool((rotation == np.eye(3)).all())
     tip = c.tip if same and not origin.any() else c.tip @ turn + origin
@@ -123,10 +125,15 @@ def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Ar
     centre, normal = c.centre @ turn + origin, c.normal @ turn
     splines = {row: points @ turn + origin for row, points in c.splines.items()}
     targets = targets_of(c, tip, axis, centre, normal, splines)
+    every = np.concatenate([tip, *splines.values()]) if splines else tip
+    return targets, cut_of(case, c, every, axis, centre, normal, place) if len(targets) else None
+
+
+def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Array, Array], targets: Targets,
+             cut: Cut | None, poses: Poses, table: dict[str, object],
+             ) -> tuple[list[Finding], tuple[float, float], dict[Aspect, int], list[NotCompared]]:
     if not len(targets):
         return [], (0.0, 0.0), {}, []
-    cut = cut_of(case, c, np.concatenate([tip, *splines.values()]) if splines else tip, axis, centre, normal, place)
-    del tip, axis
     there, along = poses.at(np.arange(len(executed)), 1.0)
     turns = turns_of(poses)
     match, owner = matched(targets, there, along, turns, case.tolerance + 1e-6, case.axis_tolerance + 1e-6)
