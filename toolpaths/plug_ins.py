@@ -11,6 +11,7 @@ Code of others may raise whatever it likes: here all of it becomes a `PlugInFaul
 from __future__ import annotations
 
 import hashlib
+import os
 import sys
 from functools import lru_cache
 from pathlib import Path
@@ -63,7 +64,7 @@ def registered(group: PlugInGroup) -> dict[str, list[EntryPoint]]:
 def _as_it_stands(folder: str) -> tuple[str, int]:
     """A folder that packages are imported from, and ns of its last change: one that is installed later changes it."""
     try:
-        return folder, Path(folder or ".").stat().st_mtime_ns
+        return folder, os.stat(folder or ".").st_mtime_ns  # noqa: PTH116  a path of each is twice as dear
     except OSError:
         return folder, 0
 
