@@ -11,9 +11,8 @@ Code of others may raise whatever it likes: here all of it becomes a `PlugInFaul
 from __future__ import annotations
 
 import hashlib
-import os
 import sys
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -64,9 +63,13 @@ def registered(group: PlugInGroup) -> dict[str, list[EntryPoint]]:
 def _as_it_stands(folder: str) -> tuple[str, int]:
     """A folder that packages are imported from, and ns of its last change: one that is installed later changes it."""
     try:
-        return folder, os.stat(folder or ".").st_mtime_ns  # noqa: PTH116  a path of each is twice as dear
+        return folder, _path(folder).stat().st_mtime_ns
     except OSError:
         return folder, 0
+
+
+_path = cache(Path)
+"""of a folder on `sys.path`; making one takes longer than to ask when it was changed"""
 
 
 @lru_cache(maxsize=16)  # all metadata of all packages are read for it: ten times a small CL file
