@@ -73,9 +73,9 @@ def build_path(modes: OutputModes, kinematics: Callable[[int], Kinematics], move
         off_path: blocks of cuts may end off their curve, within the tolerance, where they are fewer so (`balanced.py`)
     """
     machine, given, drawing = modes.control.machine, moves, drawing or RetractPlan.default(space)
-    runs = int(given.link.sum())
+    linked = int(given.link.sum())
     plan = plan_moves(machine, kinematics, moves, drawing.run_options(machine, axis_tolerance),
-                      None if progress is None else lambda run: progress("joints", run, runs))
+                      None if progress is None else lambda run: progress("joints", run, linked))
     moves = plan.refined.moves
     road = _Road(plan, modes, operation[plan.refined.origin], space, drawing,
                  plan.refined.among(home_rows), file)

@@ -184,8 +184,8 @@ def added(words: Words, new: list[tuple[int, str, float]], drop: Bools | None = 
     line = np.array([n[0] for n in new], dtype=np.int64)
     behind = np.searchsorted(kept.line, line, side="right")
     letter, value = np.array([ord(n[1]) for n in new], dtype=np.uint8), np.array([n[2] for n in new], dtype=np.float64)
-    return Words(*(_between(old, behind, more) for old, more in (
-        (kept.letter, letter), (kept.value, value), (kept.line, line))), words.lines)
+    return Words(_between(kept.letter, behind, letter), _between(kept.value, behind, value),
+                 _between(kept.line, behind, line), words.lines)
 
 
 def _between(values: Array, behind: Ints, new: Array) -> Array:
