@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from postproc.readback.text.canonical import Files, placed
-from postproc.readback.text.tool_names import called_by_number
+from postproc.readback.text.tool_names import called_otherwise
 from postproc.readback.text.words import lines_of, plain
 from toolpaths.arrays import Ints
 from toolpaths.dataclass import dataclass
@@ -105,7 +105,7 @@ def executed(data: bytes, file: str, others: Mapping[str, bytes], language: Macr
     rows = _rows_of(language)
 
     def cleaned(text: bytes, name: str) -> tuple[list[str], list[Diagnostic]]:
-        text, found = ((text, called_by_number(text, held.tools, name)) if language == "siemens" else
+        text, found = ((text, called_otherwise(text, held.tools, name)) if language == "siemens" else
                        numbered(text, name))
         made, more = rows(text, name)
         return made, [*found, *more]
