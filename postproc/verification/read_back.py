@@ -119,7 +119,8 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     executed = executed_poses(job, motion, offsets.lengths)
     with np.errstate(invalid="ignore"):
         called = {name: others[name] for name, _ in code.files[1:]} if others else {}
-        planned, changed = planned_feeds(as_bytes(data), called, gcode or job.toolpath.file)
+        planned, changed = (
+            planned_feeds(as_bytes(data), called, gcode or job.toolpath.file) if header.planned else (False, []))
         comparison = compare(code, motion, job, executed, gcode, planned)
     job = job.with_moves(comparison.moves)
     lengths = [] if any(d.code == "verify.state" for d in comparison.diagnostics) else check_lengths(motion, job, faults)

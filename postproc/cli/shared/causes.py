@@ -20,10 +20,10 @@ WITHOUT_MOVE = {_MOVE: "", f"{_MOVE}, or {_SHORTER}": _SHORTER, **{f"{_MOVE}, or
 """remedies of travel and reach, and what is left of each where no place of the part fits"""
 FOLLOWS = {"cl.no-feed": ("feed.missing", "cl.feed", "convert.turning"), "cl.no-units": ("cl.empty", "convert.turning"),
            "cl.rapid-below": ("cl.cycle-depth",),
-           "setup.tool_unused": ("tool.number",), "place.found": ("path.odd_record",),
+           "setup.tool_unused": ("tool.number",),
            "joints.chosen": ("travel.exceeded", "reach.axis", "path.odd_record"),
-           **dict.fromkeys(PLACED, ("path.odd_record",))}
-"""by code: its causes; where one of them is said, people read that alone"""
+           **dict.fromkeys(PLACED | {"place.found"}, ("path.odd_record", "cl.units"))}
+"""by code: its causes; where one of them is an error, people read that alone"""
 CAUSES = {"setup.machine": PLACED, "setup.upside_down": PLACED, "cl.no-units": PLACED}
 """by code of a warning: errors that it may be the cause of; where one of them is said, it stands before them"""
 UNREAD = frozenset({"cl.form", "cl.continuation"})
@@ -39,7 +39,7 @@ def lines_of(diagnostics: tuple[Diagnostic, ...], least: Severity) -> list[str]:
     from toolpaths.diagnostics import Severity, has_errors
 
     if has_errors(diagnostics):
-        codes = {d.code for d in diagnostics}
+        codes = {d.code for d in diagnostics if d.severity is Severity.ERROR}
         unread = {(d.file, line) for d in diagnostics if d.code in UNREAD for line in d.lines}
         diagnostics = tuple(sorted((d for d in diagnostics if codes.isdisjoint(FOLLOWS.get(d.code, ()))
                                     and not _of_unread(d, unread)),
