@@ -93,8 +93,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     """
     machine, control = job.machine, job.control
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
-    reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls, machine.clamp_codes)
-    _give(reader, job)
+    reader = _given(reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls, machine.clamp_codes), job)
     code, diagnostics = reader.read(data, gcode, others)
     header = read_header(as_bytes(data[:HEADER]))
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file, of_cl) for d in diagnostics]
@@ -151,11 +150,12 @@ def _offsets(job: Job, reader: Reader, home: Floats) -> Offsets:
                    _others(job, reader), radii, job.controller.cutter_compensation.corners, reader.home_in_planes)
 
 
-def _give(reader: Reader, job: Job) -> None:
-    """What the control holds by the set-up, for programs that ask for it."""
+def _given(reader: Reader, job: Job) -> Reader:
+    """The reader with what the control holds by the set-up, for programs that ask for it."""
     held = dict(_others(job, reader))
     reader.given(lambda register: held.get(register, job.control).work_offset, job.register_lengths(),
                  frozenset(registers_of(job, reader)))
+    return reader
 
 
 def _others(job: Job, reader: Reader) -> tuple[tuple[float, Control], ...]:
