@@ -93,8 +93,8 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     """
     machine, control = job.machine, job.control
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
-    reader = _given(reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls, machine.clamp_codes), job)
-    code, diagnostics = reader.read(data, gcode, others)
+    reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls, machine.clamp_codes)
+    code, diagnostics = _given(reader, job).read(data, gcode, others)
     header = read_header(as_bytes(data[:HEADER]))
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file, of_cl) for d in diagnostics]
     if gcode and not job.corrects and header.corrected is not None:
