@@ -16,7 +16,7 @@ from machines.kinematics.base import Kinematics
 from machines.kinematics.clearance_geometry import ClearanceGeometry
 from toolpaths.arrays import Bools, Floats
 from toolpaths.dataclass import dataclass
-from toolpaths.rotations import angle_between, dot, unit
+from toolpaths.rotations import angle_between, dot, lengths, unit
 from toolpaths.shapes import arrays
 
 BLOCK = 4096
@@ -217,5 +217,4 @@ def segment_distance(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
     s = np.where(apart, np.clip((uv * vw - uw * vv) / np.where(apart, under, 1.0), 0.0, 1.0), 0.0)
     t = np.clip((uv * s + vw) / vv, 0.0, 1.0)
     s = np.clip((uv * t - uw) / uu, 0.0, 1.0)
-    gap = w + s[:, None] * u - t[:, None] * v
-    return np.asarray(np.linalg.norm(gap, axis=1), dtype=np.float64)
+    return lengths(w + s[:, None] * u - t[:, None] * v)

@@ -32,7 +32,7 @@ ROOMS = frozenset({TESTS / "hints", TESTS / "linuxcnc", *(TESTS / "postproc" / r
     "setup_sheet", "time_study", "witness", "writing"))})
 SEEN = frozenset({"test_golden_programs.py", "test_next_modes.py"})
 """files of these rooms that show them"""
-UNHEARD = frozenset({TESTS / "linuxcnc", *(TESTS / "postproc" / room for room in (
+UNHEARD = frozenset({TESTS / "hints", TESTS / "linuxcnc", *(TESTS / "postproc" / room for room in (
     "alignment", "batch", "cli", "collision", "controllers", "correction", "cycle_time", "differences", "dossier", "joints",
     "orientation", "path", "placement", "planning", "readback", "reference", "report", "setup_sheet", "time_fit",
     "time_study"))})

@@ -120,8 +120,8 @@ def _initialiser(cls: type) -> Callable[..., None]:
     """The compiled `__init__`: sets the fields, then calls `__post_init__` where there is one."""
     fields = dataclasses.fields(cls)
     given = {False: list[str](), True: list[str]()}
-    names: dict[str, Any] = {"_put": object.__setattr__, "_factory": _FACTORY}
-    body = list[str]()
+    names: dict[str, Any] = {"_factory": _FACTORY}
+    put = list[str]()
     own = "__dataclass_self__" if any(f.name == "self" for f in fields) else "self"
     for f in fields:
         made = f.default_factory is not MISSING
@@ -132,7 +132,8 @@ def _initialiser(cls: type) -> Callable[..., None]:
         if f.init:
             given[f.kw_only is True].append(f.name + default)
         if f.init or made:
-            body.append(f" _put({own}, {f.name!r}, {value})")
+            put.append(f"{f.name}={value}")
+    body = [f" {own}.__dict__.update({', '.join(put)})"] if put else []
     if hasattr(cls, "__post_init__"):
         body.append(f" {own}.__post_init__()")
     head = ", ".join([own, *given[False], *(["*", *given[True]] if given[True] else [])])

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import hashlib
 import sys
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -63,9 +63,13 @@ def registered(group: PlugInGroup) -> dict[str, list[EntryPoint]]:
 def _as_it_stands(folder: str) -> tuple[str, int]:
     """A folder that packages are imported from, and ns of its last change: one that is installed later changes it."""
     try:
-        return folder, Path(folder or ".").stat().st_mtime_ns
+        return folder, _path(folder).stat().st_mtime_ns
     except OSError:
         return folder, 0
+
+
+_path = cache(Path)
+"""of a folder on `sys.path`; making one takes longer than to ask when it was changed"""
 
 
 @lru_cache(maxsize=16)  # all metadata of all packages are read for it: ten times a small CL file

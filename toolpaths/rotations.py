@@ -56,8 +56,8 @@ def unit(v: Floats, nowhere: float = np.nan) -> Floats:
 
 
 def dot(a: Floats, b: Floats) -> Floats:
-    """a . b (...,) of vectors (..., 3)."""
-    return np.asarray(np.sum(a * b, axis=-1))
+    """a . b (...,) of vectors (..., 3), column by column as in `lengths`."""
+    return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2])
 
 
 def cross(a: Floats, b: Floats) -> Floats:

@@ -64,9 +64,13 @@ def _clear(machine: Machine, q: Floats) -> Bools:
 
 
 def _fits(machine: Machine, middle: Floats, half: Floats, axis: Floats) -> bool:
-    sides = [np.linspace(m - h, m + h, POINTS) for m, h in zip(middle, half, strict=True)]
-    tip = np.stack([side.ravel() for side in np.meshgrid(*sides)], axis=1)
-    return bool(reached(machine, tip, np.tile(axis, (len(tip), 1))).all())
+    """Whether all grid points are in reach; the corners first: of most boxes that are too large one of them is not."""
+    for count in (2, POINTS):
+        sides = [np.linspace(m - h, m + h, count) for m, h in zip(middle, half, strict=True)]
+        tip = np.stack([side.ravel() for side in np.meshgrid(*sides)], axis=1)
+        if not reached(machine, tip, np.tile(axis, (len(tip), 1))).all():
+            return False
+    return True
 
 
 def _tuple(v: Floats) -> tuple[float, float, float]:

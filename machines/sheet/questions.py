@@ -52,6 +52,7 @@ class SheetQuestion:
 
 _WHERE = {"MRZP": " (settings 255 to 257, as the control shows them)", "MRZP second": " (where the control has two sets)"}
 """where the numbers of a pivot stand, by its name"""
+_ON_ITS_LINE = " (a point on the line that it turns about, in machine coordinates, all axes at 0)"
 Ask = Callable[[SheetQuestion], str]
 
 
@@ -174,13 +175,15 @@ def _pivots(sheet: _Sheet, table: tuple[str, ...], head: tuple[str, ...]) -> Ite
             raise ValueError(f"{text!r} is not three numbers, X Y Z in mm")
         return json.dumps(numbers)
 
-    form = sheet.text(f"pivots by the names of which control ({', '.join(get_args(PivotForm))})", "machine", known)
+    machine, *controls = get_args(PivotForm)
+    form = sheet.text(f"pivots: {machine} (a point of each axis), or the numbers of {', '.join(controls)}", machine, known)
     yield from ("", "[pivots]", f"form = {form}", "[pivots.points]")
     for chain in names_of(json.loads(form), table, head):
         for name in chain:
             needed = "(" not in name and name != "MRZP second"
             plain = name.strip("()")
-            asked = f"{plain}{_WHERE.get(plain, '')}: X Y Z in mm"
+            where = _ON_ITS_LINE if json.loads(form) == machine else _WHERE.get(plain, "")
+            asked = f"{plain}{where}: X Y Z in mm"
             words, default = (asked, None) if needed else (f"{asked}; empty: none", "")
             numbers = sheet.text(words, default, vector)
             yield from [f"{json.dumps(plain)} = {numbers}"] if numbers else []

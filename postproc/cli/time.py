@@ -10,6 +10,7 @@ import typer
 
 from postproc.cli.shared.console import Json, own_files, progress_bar, refuse_overwriting, report, shown_errors
 from postproc.cli.shared.options import (
+    Allow,
     AxisToleranceOption,
     Beyond,
     ControllerName,
@@ -75,6 +76,7 @@ def time(machine: MachineName,
          axis_tolerance: AxisToleranceOption = 0.05,
          units: UnitsOption = "",
          dialect: DialectOption = "",
+         allow_unknown: Allow = None,
          error_model: Annotated[str, typer.Option("--error-model", metavar="E.toml", help="time a CL file with these "
                                                   "geometric errors of the machine corrected")] = "",
          beyond: Beyond = False,
@@ -103,8 +105,9 @@ def time(machine: MachineName,
     from postproc.base.options import Options
     from postproc.cli.time_variants import Asked, answer, test_of_the_control
 
-    options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, error_model=error_model, hooks=hooks,
-                      error_beyond=beyond)
+    unknown = tuple(w.upper() for w in allow_unknown or ())
+    options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, unknown, error_model=error_model,
+                      hooks=hooks, error_beyond=beyond)
     asked = Asked(tuple(files), (machine, *(with_machine or [])), controller, model, (setup, *(with_setup or [])),
                   tuple(what_if or ()), tuple(logs), output, override, options, csv, figure, check is not None, ending,
                   test, plan_seconds)

@@ -153,8 +153,8 @@ def _timed(file: Path, machine: Machine, change: WhatIf, setup: str, asked: Aske
     from postproc.pipeline.convert import convert
 
     path, found = toolpaths.read_bytes(
-        data, file=str(file), units=options.units or None, dialect=options.dialect or None, tolerance=options.tolerance
-    )
+        data, file=str(file), units=options.units or None, dialect=options.dialect or None, tolerance=options.tolerance,
+        allow_unknown=options.allow_unknown)
     del data
     result = convert(path, machine, asked.controller, options=options, diagnostics=found, progress=progress,
                      clock=program_clock(asked.model))

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 
 
 OF_SETUP = frozenset({"tool.number", "tool.same_number", "tool.length", "feed.missing", "spindle.not_started",
-                      "spindle.no_speed"})
+                      "spindle.no_speed", "spindle.surface_speed"})
 """codes of what a set-up answers: where nothing else is wrong all that is missing is reported at once"""
 
 

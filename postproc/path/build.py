@@ -200,7 +200,7 @@ def _add_links(out: PathBuilder, road: _Road, runs: SolvedRuns, stand: _Stand,
                                                  run.kin, before.pose, entry, down, _risen(modes, before.frame, link)))
         inside = _home_inside(modes, before.kin, run.kin, space) if by_home else None
         if not link.clear or (inside is not None and not has_retract_axis(travel.control)):
-            found.append(faults.no_path(modes.control.machine, moves, first, road.file, inside))
+            found.append(faults.no_path(modes.control.machine, moves, first, road.file, space.lower, inside))
         if progress:
             progress("blocks", run.last, len(moves))
     return stand, longer, found

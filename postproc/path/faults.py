@@ -109,8 +109,9 @@ def _elsewhere(kin: Kinematics, tip: Floats, q: Floats) -> Bools:
     return np.asarray(~(np.linalg.norm(there - tip, axis=1) <= _ELSEWHERE))
 
 
-def no_path(machine: Machine, moves: Moves, row: int, file: str, home: Floats | None = None) -> Diagnostic:
-    """The error where no linking move leads to row `row` of the moves; `home` (3,): tip at home, if that is in the part."""
+def no_path(machine: Machine, moves: Moves, row: int, file: str, lower: str, home: Floats | None = None) -> Diagnostic:
+    """The error where no linking move leads to row `row` of the moves; `home` (3,): tip at home, if that is in the part;
+    `lower`: what brings linking moves down."""
     if machine.kinematics.plane is not None:
         return error("link.in_plane", f"{machine.name} moves the tool in one plane alone, so no linking move leaves what is "
                      "cut", file=file, lines=[int(moves.line[row])], hint="write in_plane = true under [clearance] of "
@@ -123,7 +124,7 @@ def no_path(machine: Machine, moves: Moves, row: int, file: str, home: Floats | 
                      file=file, lines=[int(moves.line[row])],
                      hint="move the part away from home (part.origin), or state another home in the machine file")
     return error("link.blocked", "no linking move stays above the safe planes", file=file, lines=[int(moves.line[row])],
-                 hint="move the part in the set-up (part.origin), or lower clearance.margin")
+                 hint=f"move the part in the set-up (part.origin), or {lower}")
 
 
 def broken(machine: Machine, moves: Moves, rows: Ints, q: Floats, file: str) -> list[Diagnostic]:

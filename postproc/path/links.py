@@ -55,6 +55,8 @@ class SafeSpace:
     centres: Floats
     in_plane: bool = False
     """linking moves may go straight in the plane that the machine never leaves"""
+    lower: str = ""
+    """what brings linking moves down, in words"""
 
     def plane(self, axis: Floats, turning: bool, share: float) -> float:
         """Distance of the safe plane square to `axis` from the centre; `share` of the margin."""
@@ -96,7 +98,7 @@ def safe_space(moves: Moves, setup: SetupFile, placement: Placement, place: Ints
         centres = np.array([[0.5 * (x.min() + x.max()) for x in _cut(moves, np.flatnonzero(place == k)).T]
                             for k in np.unique(place)])
     return SafeSpace(centre, radius, box_corners(low, high), setup.clearance.distance, setup.clearance.margin, centres,
-                     setup.clearance.in_plane)
+                     setup.clearance.in_plane, setup.clearance.lower)
 
 
 def _cut(moves: Moves, rows: Ints | slice) -> Floats:

@@ -29,8 +29,9 @@ def inside(kinematics: Kinematics, q: Floats) -> bool:
     return bool((clearances.reach(kinematics, q).values >= -_SLACK).all())
 
 
-def check_reach(path: JointPath, moves: Moves, control: Control, file: str = "") -> list[Diagnostic]:
-    """Workspace, joint and clearance bounds that the blocks pass, as errors; nothing for serial machines."""
+def check_reach(path: JointPath, moves: Moves, control: Control, file: str, lower: str) -> list[Diagnostic]:
+    """Workspace, joint and clearance bounds that the blocks pass, as errors; nothing for serial machines. `lower`: what
+    brings linking moves down."""
     kinematics = control.machine.kinematics
     if not is_checked(kinematics):
         return []
@@ -42,7 +43,7 @@ def check_reach(path: JointPath, moves: Moves, control: Control, file: str = "")
         linking = " in a linking move" if np.isnan(path.u[worst]) else ""
         message = f"{name}: passed by {-(value - _SLACK) * unit:.4f} {what}{linking}, allowed at least 0"
         result.append(error("reach.clearance", message, file=file, lines=[int(moves.line[path.move[worst]])], count=count,
-                            hint="move the part in the set-up (part.origin), turn it, or lower clearance.margin"))
+                            hint=f"move the part in the set-up (part.origin), turn it, or {lower}"))
     return result
 
 

@@ -13,12 +13,16 @@ from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.joints.tracks import TRAVEL_SLACK
 from postproc.path.model import ARC, JointPath
 from postproc.reference.moves import Moves
+from postproc.setup.model import LOWER
 from toolpaths.arrays import Floats, Ints, distinct
 from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.toolpath import Kind
 from toolpaths.units import DEG
 
 PART = 50_000
 """blocks that are looked at together"""
+_ALONG = 0.5
+"""of what a joint moves, which is along the tool where the tool's length counts in its travel"""
 
 
 def _arc_extremes(path: JointPath, law: Control, k: Ints, at_start: Floats, low: Floats,
@@ -57,9 +61,10 @@ def _arc_extremes(path: JointPath, law: Control, k: Ints, at_start: Floats, low:
 
 
 def check_travel(path: JointPath, moves: Moves, control: Control, kinematics: Callable[[int], Kinematics],
-                 file: str = "", where: Callable[[Ints], str] = lambda moves: "",
+                 file: str = "", where: Callable[[Ints], str] = lambda moves: "", lower: str = LOWER[-1],
                  ) -> tuple[list[Diagnostic], dict[str, tuple[float, float]]]:
-    """(excesses as errors, extents of each axis in mm or degrees); `where` says at which place moves (K,) are made."""
+    """(excesses as errors, extents of each axis in mm or degrees); `where` says at which place moves (K,) are made,
+    `lower` what brings linking moves down."""
     machine, limits = control.machine, control.machine.limits
     lowest, highest = np.full(len(limits.lower), np.inf), np.full(len(limits.lower), -np.inf)
     beyond: list[tuple[Ints, Floats, Floats]] = []
@@ -78,7 +83,7 @@ def check_travel(path: JointPath, moves: Moves, control: Control, kinematics: Ca
         bad = over > TRAVEL_SLACK
         if bad.any():
             diagnostics.append(_excess(path, moves, control, j, rows[bad], low[bad, j], high[bad, j], over[bad], file,
-                                       where(path.move[rows[bad]]), kinematics))
+                                       where(path.move[rows[bad]]), kinematics, lower))
     return diagnostics, extents
 
 
@@ -108,13 +113,22 @@ def extremes(path: JointPath, moves: Moves, control: Control, kinematics: Callab
     return low, high
 
 
+def _shorter_helps(kinematics: Kinematics, q: Floats, j: int, over: float) -> bool:
+    """True where the joints (J,) have a tool longer than joint `j` lacks, and that joint moves along it."""
+    if kinematics.tool_length <= over:
+        return False
+    tip, axis = kinematics.forward(np.stack([q, q + np.eye(len(q))[j]]))
+    return bool(abs((tip[1] - tip[0]) @ axis[0]) > _ALONG)
+
+
 def _excess(path: JointPath, moves: Moves, control: Control, j: int, bad: Ints, low: Floats, high: Floats, over: Floats,
-            file: str, where: str, kinematics: Callable[[int], Kinematics]) -> Diagnostic:
+            file: str, where: str, kinematics: Callable[[int], Kinematics], lowering: str) -> Diagnostic:
     """Axis j goes beyond its travel in the blocks `bad` (K,), to `low`, `high`, by `over` (K,), at a place."""
     machine = control.machine
     rotary = machine.rotary[j]
     unit, name = (1.0 / DEG, "degrees") if rotary else (1.0, "mm")
-    at = int(over.argmax())
+    cuts = ~np.isnan(path.u[bad]) & (moves.kind[path.move[bad]] != Kind.RAPID)
+    at = int(np.where(cuts | ~cuts.any(), over, 0.0).argmax())  # a link follows from the cuts at its ends
     worst = bad[at]
     value = high[at] if high[at] > machine.limits.upper[j] + TRAVEL_SLACK else low[at]
     lower, upper = machine.limits.lower[j] * unit, machine.limits.upper[j] * unit
@@ -124,9 +138,11 @@ def _excess(path: JointPath, moves: Moves, control: Control, j: int, bad: Ints, 
     hint = "move the part in the set-up (part.origin)"
     if rotary:
         hint = "turn the part in the set-up, or split the operation"
-    elif linking:
-        long = kinematics(int(moves.tool[path.move[worst]])).tool_length > 0.0
-        hint += ", lower clearance.margin, or use a shorter tool (gauge_length)" if long else ", or lower clearance.margin"
+    else:
+        others = [lowering] if linking else []
+        if _shorter_helps(kinematics(int(moves.tool[path.move[worst]])), path.q[worst], j, float(over[at])):
+            others.append("use a shorter tool (gauge_length)")
+        hint += "".join(f", {'or ' * (k + 1 == len(others))}{one}" for k, one in enumerate(others))
     return error("travel.exceeded", f"axis {machine.axis_names[j]} goes to {value * unit:.4f} {name}{linking}{where}, "
                  f"allowed {lower:.4f} to {upper:.4f} {name}", file=file,
                  lines=[first, *(n for n in lines[:6].tolist() if n != first)], count=len(lines), hint=hint)

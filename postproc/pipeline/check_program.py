@@ -78,8 +78,8 @@ def check_program(made: PostResult, controller: str | Path, name: str) -> PostRe
         why = next(d.message for d in first.diagnostics if d.severity is Severity.ERROR)
     raise DiagnosticError([error("check.poses", f"no five poses at ({', '.join(f'{v:.3f}' for v in point)}) mm of the table "
                                  f"frame: {why}", file=made.toolpath.file,
-                                 hint="lower clearance.margin, use a shorter tool, or place the part where the axes have "
-                                 "more room ([part] of the set-up)")])
+                                 hint=f"{job.setup.clearance.lower}, use a shorter tool, or place the part where the axes "
+                                 "have more room ([part] of the set-up)")])
 
 
 def checked_file(made: PostResult, controller: str | Path, file: Path | None) -> dict[Path, str]:

@@ -104,6 +104,8 @@ def staged(result: PostResult, progress: Progress | None = None,
         if stage.name == "write" and begun.keep == "summary" and is_summed_up(made.job, made.machine):
             figures = written_figures(made.job, made.toolpath, made.path, made.program, made.feeds)
             made, result = without_path(made), replace(result, figures=figures, path=None, program=None, feeds=None)
+    if result.figures is not None and result.comparison is not None:
+        result = replace(result, comparison=result.comparison.without_poses())
     return replace(result, text=made.text, files=made.files)
 
 
@@ -177,8 +179,10 @@ def corrected(made: SolvedStage, progress: Progress | None) -> tuple[SolvedStage
     from postproc.correction.compensation import compensate
 
     options, file, moves = job.options, made.toolpath.file, made.moves
-    far = check_travel(path, job.moves, job.control, job.kinematics, file, at_place(job.places, job.repeats, job.moves))[0]
-    far += check_reach(path, job.moves, job.control, file)
+    lower = job.setup.clearance.lower
+    far = check_travel(path, job.moves, job.control, job.kinematics, file, at_place(job.places, job.repeats, job.moves),
+                       lower)[0]
+    far += check_reach(path, job.moves, job.control, file, lower)
     if has_errors(far):
         return made, with_system(far, job.work_system, job.placement, job.moves.axis)
     better, report, found = compensate(path, moves, block_tools(path, moves), job.kinematics, job.errors, job.modes,
@@ -193,8 +197,8 @@ def checked(made: CorrectedStage, progress: Progress | None) -> tuple[CheckedSta
     """Travel, reach, distance from singular positions."""
     job, path, file = made.job, made.path, made.toolpath.file
     found, extents = check_travel(path, job.moves, job.control, job.kinematics, file,
-                                  at_place(job.places, job.repeats, job.moves))
-    found += check_reach(path, job.moves, job.control, file)
+                                  at_place(job.places, job.repeats, job.moves), job.setup.clearance.lower)
+    found += check_reach(path, job.moves, job.control, file, job.setup.clearance.lower)
     found += check_singular(path, job.moves, job.control, job.setup.joints.singular_distance, file)
     return handed_on(CheckedStage, made, extents=extents), with_system(found, job.work_system, job.placement, job.moves.axis)
 

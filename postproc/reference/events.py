@@ -12,7 +12,7 @@ import numpy as np
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.dataclass import dataclass
 from toolpaths.toolpath import Event, Kind, Role, Toolpath
-from toolpaths.units import PER_MINUTE
+from toolpaths.units import MM_PER_INCH, PER_MINUTE
 
 TOOL_WORDS = frozenset({"LOADTL", "LOAD/TOOL", "LOAD", "TURRET"})
 
@@ -114,13 +114,26 @@ class Spindle:
 
 
 def speed_said(event: Event) -> float | None:
-    """rev/min of a SPINDL record: the number after RPM, else the only one that belongs to no other word."""
+    """rev/min of a SPINDL record: the number after RPM, else the only one that belongs to no other word; 0 where it is a
+    cutting speed."""
     return _rpm_said(event.values)
+
+
+def cutting_speed_said(event: Event) -> float | None:
+    """m/min of a SPINDL record with SMM, or with SFM in feet; None where it states none."""
+    said = _words(event.values)
+    if event.word != "SPINDL" or said.isdisjoint(_CUTTING_SPEED):
+        return None
+    speeds = [float(v) for before, v in zip(("", *event.values), event.values, strict=False)
+              if isinstance(v, (int, float)) and str(before).upper() not in _RANGES]
+    return speeds[0] * (MM_PER_INCH * 12e-3 if "SFM" in said else 1.0) if len(speeds) == 1 else math.nan
 
 
 @lru_cache(maxsize=256)
 def _rpm_said(values: tuple[str | float, ...]) -> float | None:
     """Kept, as a file repeats few of them."""
+    if not _words(values).isdisjoint(_CUTTING_SPEED):
+        return 0.0
     loose: list[float] = []
     for before, value in zip(("", *values), values, strict=False):
         if isinstance(value, (int, float)):
@@ -135,6 +148,7 @@ def _rpm_said(values: tuple[str | float, ...]) -> float | None:
 _RANGES = frozenset({"RANGE", "LOW", "MEDIUM", "HIGH"})
 
 
+_CUTTING_SPEED = frozenset({"SFM", "SMM"})
 _STOPPING = frozenset({"OFF", "NEUTRL", "NEUTRAL"})
 
 

@@ -195,7 +195,8 @@ def _check_spindle(event: Event, report: Report) -> None:
     speed = speed_said(event)
     if {"SFM", "SMM"} & said:
         report(Severity.ERROR, "spindle.surface_speed", "the spindle speed is given as a cutting speed", event.line,
-               "state rev/min (SPINDL/RPM,n,CLW) in the CAM system")
+               "state rev/min (SPINDL/RPM,n,CLW) in the CAM system, or add the speed to the set-up: [tools.N], or for all "
+               "tools [output], spindle = { rpm = ..., direction = \"clockwise\" }")
     elif speed is None and numbers(event) and "OFF" not in said and said <= _SPINDLE | _RANGES and (
             not said & _RANGES or "RPM" in said):
         report(Severity.ERROR, "spindle.speed", "SPINDL: which of the numbers is the speed?", event.line,

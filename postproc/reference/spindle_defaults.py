@@ -31,6 +31,7 @@ _COOLANT = {"off": "OFF", "flood": "FLOOD", "mist": "MIST", "through": "THRU", "
 _ALONG = 1e-9
 """by which the cosine between a straight retract and the tool axis may be less than 1"""
 _OFF = frozenset({"OFF", "NEUTRL", "NEUTRAL"})
+_OF_SPEED = frozenset({"RPM", "SFM", "SMM", "CLW", "CCLW", "ON"})
 _FASTEST = 400_000.0
 """rev/min: beyond the air-bearing spindles that drill circuit boards, the fastest that cut"""
 _DRY: tuple[str | float, ...] = ("OFF",)
@@ -124,7 +125,7 @@ def _said(word: str, here: tuple[Event, ...], first: int) -> bool:
 
 def _with_speeds(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, Stated]:
     """The path with the set-up's speed in records that state 0 rev/min, as CAM systems write where nobody has
-    entered one; the direction is the record's, where it says one."""
+    entered one, or a cutting speed; the direction is the record's, where it says one."""
     if not any(e.word == "SPINDL" and speed_said(e) == 0.0 for e in toolpath.events):
         return toolpath, {}
     result, stated = list(toolpath.events), Stated()
@@ -133,7 +134,7 @@ def _with_speeds(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, Stated
         for k in range(use.begin, use.end):
             event = result[k]
             said = set(words(event))
-            if wanted is None or event.word != "SPINDL" or speed_said(event) != 0.0 or said - {"RPM", "CLW", "CCLW", "ON"}:
+            if wanted is None or event.word != "SPINDL" or speed_said(event) != 0.0 or said - _OF_SPEED:
                 continue
             own = "CLW" if "CLW" in said else "CCLW" if "CCLW" in said else ""
             side = own or ("CLW" if wanted.direction == "clockwise" else "CCLW")

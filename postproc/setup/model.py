@@ -46,6 +46,9 @@ class PartPlacement(UserModel):
     """its y direction in the table frame"""
 
 
+LOWER = "lower clearance.distance", "put clearance.centre nearer to the part", "lower clearance.margin"
+
+
 class LinkClearance(UserModel):
     """How linking moves keep away from the part."""
 
@@ -59,14 +62,17 @@ class LinkClearance(UserModel):
     link_angle: float = Field(default=5.0, gt=0.0, le=180.0)
     """a rapid that turns the tool axis by more than this is linked by the safe planes, degrees"""
     index: Literal["plane", "home"] | None = None
-    """where the tool waits while a link turns rotary axes: on the safe plane, or with the retract axis at home (G53 Z0);
-    default: as the controller file has it ([links] index)"""
+    """where the tool waits while a link turns rotary axes: safe plane, or home (G53 Z0); default: the controller's"""
     between: Literal["home", "plane"] = "home"
-    """where the tool goes between two [[places]]: with the retract axis to home (G53 Z0), or along the safe plane above
-    all of them"""
+    """where the tool goes between two [[places]]: the retract axis to home (G53 Z0), or along the safe plane above all"""
     in_plane: bool = False
     """true: on a machine that moves the tool in one plane alone, linking moves go straight in that plane, the tool lifted
     or switched off by other means ([hooks]); false: they are refused"""
+
+    @property
+    def lower(self) -> str:
+        """What brings linking moves down, in words: one of LOWER."""
+        return LOWER[0 if self.distance is not None else 1 if self.centre is not None else 2]
 
 
 TOOL_LIMITS = ("tip_acceleration", "tip_jerk", "axis_rate")

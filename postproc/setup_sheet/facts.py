@@ -14,7 +14,7 @@ from postproc.base.options import Options
 from postproc.control.modes import table_axes
 from postproc.controllers.model import ControllerFile
 from postproc.job.job import OF_SETUP, prepare
-from postproc.reference.events import cutting, spindle_states
+from postproc.reference.events import cutting, cutting_speed_said, spindle_states
 from postproc.reference.records import plain_records
 from postproc.reference.same_tool import differ
 from postproc.reference.spindle_defaults import Use, uses
@@ -42,6 +42,15 @@ class NumberedTool:
 
 
 @dataclass(frozen=True)
+class CuttingSpeed:
+    """The first cutting speed that the CL file states for a tool, as it states it, and the rev/min that it is at the
+    tool's diameter."""
+
+    said: str
+    rpm: float
+
+
+@dataclass(frozen=True)
 class ToolFacts:
     """A tool that cuts, by its number.
 
@@ -50,6 +59,7 @@ class ToolFacts:
         speed: of the CL file in words, "" where it states none for some cut
         direction: of the spindle in the cuts without a speed, where the CL file states it for all of them, else clockwise
         coolant: of the CL file, "" where it states none
+        cutting_speed: where the CL file states one in the place of rev/min
         cutter: length of the cutter as CAM draws it, mm, or None
     """
 
@@ -60,6 +70,7 @@ class ToolFacts:
     cutter: float | None
     line: int
     direction: Direction = "clockwise"
+    cutting_speed: CuttingSpeed | None = None
 
 
 @dataclass(frozen=True)
@@ -180,7 +191,20 @@ def _tools(path: Toolpath) -> Iterator[ToolFacts]:
         tool = path.tools[int(path.tool[rows[0]])] if path.tool[rows[0]] >= 0 else Tool(number)
         yield ToolFacts(number, _called(tool, number), "" if stands.any() else ", ".join(speeds) + " rev/min",
                         _coolant(events), _height(tool), int(path.line[rows[0]]),
-                        "anti-clockwise" if stands.any() and (direction[rows[stands]] < 0).all() else "clockwise")
+                        "anti-clockwise" if stands.any() and (direction[rows[stands]] < 0).all() else "clockwise",
+                        _cutting_speed(events, tool))
+
+
+def _cutting_speed(events: list[Event], tool: Tool) -> CuttingSpeed | None:
+    """At the outside of the tool: v = pi d n."""
+    if not tool.diameter:
+        return None
+    for event in events:
+        speed = cutting_speed_said(event)
+        if speed is not None and speed > 0.0:
+            said = f"{event.word}/{','.join(f'{v:g}' if isinstance(v, float) else str(v) for v in event.values)}"
+            return CuttingSpeed(f"{said} at diameter {tool.diameter:.4g} mm", round(1e3 * speed / (math.pi * tool.diameter)))
+    return None
 
 
 def _coolant(events: list[Event]) -> str:

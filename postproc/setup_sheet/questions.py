@@ -154,8 +154,11 @@ def questions_of(facts: SheetFacts) -> list[Question]:
                                    "place are then found as if it were 0)", "", None, optional=True))
         if not tool.speed:
             most = "" if math.isinf(facts.largest_speed) else f", at most {facts.largest_speed:g}"
-            result.append(Question("spindle", tool.number, f"{tool.called}: spindle speed, {tool.direction}{most}", None,
-                                   min(ASSUMED_SPEED, facts.largest_speed), largest=facts.largest_speed))
+            of = tool.cutting_speed
+            offered = min(of.rpm if of else ASSUMED_SPEED, facts.largest_speed)
+            why = f" (offered: {of.said})" if of else ""
+            result.append(Question("spindle", tool.number, f"{tool.called}: spindle speed, {tool.direction}{most}{why}",
+                                   offered if of else None, offered, largest=facts.largest_speed))
     if facts.without_feed:
         result.append(Question("feed", 0, f"feed of {facts.without_feed} moves that cut without one", None, ASSUMED_FEED))
     if not any(tool.coolant for tool in facts.tools):

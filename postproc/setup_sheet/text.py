@@ -127,7 +127,9 @@ def _tool(tool: ToolFacts, facts: SheetFacts, answers: Mapping[str, Answer]) -> 
     speed = answers.get(f"tools.{tool.number}.spindle")
     if speed is not None:
         yield _line("spindle", f'{{ rpm = {speed.value:g}, direction = "{tool.direction}" }}',
-                    f"rev/min; {_from(speed)}; the CL file states none for some cut")
+                    f"rev/min; {_from(speed)}; the CL file states "
+                    + (f"{remark_text(tool.cutting_speed.said)}: {tool.cutting_speed.rpm:g}" if tool.cutting_speed
+                       else "none for some cut"))
     else:
         yield f"# spindle: {tool.speed}, of the CL file"
     yield remark_text(f"# coolant: {tool.coolant or 'none stated, see [output]'}{', of the CL file' * bool(tool.coolant)}")

@@ -321,8 +321,10 @@ def _spindl(e: Execution, r: Record, line: int) -> None:
              and before not in ("RANGE", "LOW", "MEDIUM", "HIGH", "RPM")]
     said = r.after("RPM")
     said = said if said is not None else loose[0] if len(loose) == 1 else None
-    if r.has("SFM", "SMM", "MAXRPM"):
-        e.lost("SPINDL by cutting speed", line)
+    if r.has("SFM", "SMM"):
+        said = math.nan
+    elif r.has("MAXRPM"):
+        e.lost("SPINDL with a largest speed", line)
         e.spindle.set(e.row, (UNFOLLOWED, math.nan))
         return
     direction = -1 if r.has("CCLW") else 1 if r.has("CLW") else e.last_direction

@@ -65,13 +65,18 @@ class HintCase:
     stands_in: tuple[tuple[str, Any], ...] = ()
     ends: bool = False
 
+    @property
+    def plain(self) -> bool:
+        """Whether nothing but its files and commands makes what is said."""
+        return not (self.stands_in or self.packages)
+
     def begin(self, folder: Path) -> None:
         """The files, and what the first commands write."""
         for name, text in self.files.items():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             (folder / name).write_bytes(text.encode("utf-8", "surrogateescape"))
         for command in self.first:
-            code, found = called(command, folder)
+            code, found = called(command, folder, self.plain)
             assert code == 0, [f"{d['code']} {d['message']}" for d in found]
         for edit in self.harm:
             write(folder, edit, None)
@@ -105,12 +110,34 @@ def write(folder: Path, edit: Edit, match: re.Match[str] | None) -> None:
     place.write_bytes(replaced(before, edit, match).encode("utf-8", "surrogateescape"))
 
 
-def called(command: str, folder: Path) -> tuple[int, list[dict[str, Any]]]:
-    """Exit code and diagnostics of a command in a folder (the working directory is that folder)."""
+def called(command: str, folder: Path, shared: bool = False) -> tuple[int, list[dict[str, Any]]]:
+    """Exit code and diagnostics of a command in a folder (the working directory is that folder).
+
+    `shared`: where the same command was called for the same files before, it does and says what it did then.
+    """
+    key = (command, _files(folder)) if shared else None
+    if key in _CALLED:
+        code, found, written = _CALLED[key]
+        for name, content in written.items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(content)
+        return code, found
     got = CliRunner().invoke(app, [*shlex.split(command), "--json", "-"])
     assert got.exit_code in (0, 1), f"{command}: {got.exit_code} {got.stderr}\n{got.exception!r}"
-    found: list[dict[str, Any]] = json.loads(got.stdout).get("diagnostics", [])
+    found = json.loads(got.stdout).get("diagnostics", [])
+    if key is not None:
+        new = _files(folder) - key[1]
+        _CALLED[key] = got.exit_code, found, {name: content for name, content in new if content is not None}
     return got.exit_code, found
+
+
+_CALLED: dict[object, tuple[int, list[dict[str, Any]], dict[str, bytes]]] = {}
+
+
+def _files(folder: Path) -> frozenset[tuple[str, bytes | None]]:
+    """What is in a folder: names and bytes, None of a folder."""
+    return frozenset((one.relative_to(folder).as_posix(), one.read_bytes() if one.is_file() else None)
+                     for one in folder.rglob("*"))
 
 
 def example(case: HintCase) -> str:

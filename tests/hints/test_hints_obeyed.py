@@ -26,14 +26,14 @@ EXPLAINED = tomllib.loads((DATA / "codes.toml").read_text("utf-8"))
 """messages and remedies by code; `tests/postproc/explain` compares them with the source"""
 VERDICTS = frozenset({"do not run this program"})
 """what is said of a program that is wrong: no remedy, the fault is in the project or in what others have edited"""
-OF_LENGTHS = "tool-table.outside"
-"""the code whose hint says by how much lengths of tools may be off"""
+LOOKED_AT = frozenset({"tool-table.outside", "witness.failed"})
+"""codes of how far lengths of tools may be off, and of the second witness (`tests/margins.py`)"""
 NOTHING = "nothing is to be done"
 """how a hint begins that only says what was taken and why that is right: no remedy"""
 
 
 FEW_PLACES = {"report.GRID": (3, 3, 3, 2), "report.COARSE": (2, 2, 2, 2), "extremes.MOST": 20, "extremes.START": 20,
-              "transmission.ROUNDS": 2}
+              "transmission.ROUNDS": 2, "box.POINTS": 3, "box.STEPS": 16}
 """where a machine is analysed"""
 
 
@@ -71,7 +71,7 @@ def test_a_hint_to_who_calls_the_package_is_obeyed(case: CallCase, tmp_path: Pat
 
 @pytest.mark.parametrize("case", OF_PROGRAMS.values(), ids=OF_PROGRAMS)
 def test_a_hint_obeyed_is_the_end_of_its_fault(case: HintCase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with looked_at() if case.code == OF_LENGTHS else nullcontext():
+    with looked_at() if case.code in LOOKED_AT else nullcontext():
         assert not faults_of(case, tmp_path, monkeypatch)
 
 
@@ -92,7 +92,7 @@ def faults_of(case: HintCase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     if not said:
         return ["not said", *_lines(before)]
     again = case.obey(tmp_path, said[0]["hint"])
-    code, after = called(again, tmp_path)
+    code, after = called(again, tmp_path, case.plain)
     left = [d for d in after if (d["message"] == said[0]["message"] if case.code_left else d["code"] == case.code)]
     errors = {d["code"] for d in after if d["severity"] == "error"}
     others = [d for d in after if d["severity"] == "error" and d["code"] not in case.stops]

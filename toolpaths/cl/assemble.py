@@ -12,13 +12,13 @@ from toolpaths.cl import indexing
 from toolpaths.cl.arcs import UNIT_ROUNDING, CircleRecords, arcs_of, unit
 from toolpaths.cl.build import ModalValue, ToolpathBuilder
 from toolpaths.cl.heights import height_of, place
+from toolpaths.cl.tools import AXIS_AGREES, is_of_milling
 from toolpaths.cl.unnumbered import loaded, named
 from toolpaths.diagnostics import Severity
 from toolpaths.given_arrays import passes
 from toolpaths.toolpath import Arcs, Cycle, FeedMode, Frame, Kind, Operation, Role, Tool, Toolpath
 
 NORMAL_ROUNDING = 1e-3
-AXIS_AGREES = 2e-3
 T = TypeVar("T")
 
 
@@ -354,14 +354,13 @@ def _feeds(b: ToolpathBuilder, rows: PointRows, kind: Array) -> tuple[Floats, Ar
 
 
 def _turning(b: ToolpathBuilder, rows: PointRows, column: Ints) -> set[int]:
-    """Operations that are turning: by a word for it, or by a surface speed where no tool axis leans."""
+    """Operations that are turning: by a word for it, or by a surface speed where no tool axis leans and all points lie in
+    one plane, as those of a lathe do: that of its spindle and the tip."""
     n = len(rows)
-    leans = set(distinct(column[np.abs(rows.axis[:, :2]).max(axis=1) > AXIS_AGREES]).tolist()) if b.surface_speed else set()
+    marked = {int(column[row]) if row < n else op for op, row in b.surface_speed}
+    mills = {op for op in marked if is_of_milling(rows.axis[column == op], rows.tip[column == op])}
 
-    def of(marks: set[tuple[int, int]]) -> set[int]:
-        return {int(column[row]) if row < n else op for op, row in marks}
-
-    return of(b.turning) | (of(b.surface_speed) - leans)
+    return {int(column[row]) if row < n else op for op, row in b.turning} | (marked - mills)
 
 
 def _operations(b: ToolpathBuilder, rows: PointRows) -> tuple[Array, tuple[Operation, ...], tuple[Frame, ...]]:

@@ -251,7 +251,7 @@ class ToolpathBuilder:
         self.turning.add((self.operation.now, self.row))
 
     def has_surface_speed(self) -> None:
-        """The operation of the next row is turning, unless its tool axis leans."""
+        """The operation of the next row is turning, unless its tool axis leans or its points lie in no plane."""
         self.surface_speed.add((self.operation.now, self.row))
 
     def mills(self) -> None:

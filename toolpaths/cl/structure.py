@@ -146,7 +146,8 @@ def dwell(b: ToolpathBuilder, s: Statement) -> None:
 
 
 def spindl(b: ToolpathBuilder, s: Statement) -> None:
-    """An event; a surface speed belongs to turning, but where TLDATA describes a mill or a drill, or the tool axis leans."""
+    """An event; a surface speed belongs to turning, but where TLDATA describes a mill or a drill, the tool axis leans,
+    or the points lie in no plane."""
     if s.has("SFM", "SMM") and not is_rotating(b):
         b.has_surface_speed()
     plain_event(b, s)

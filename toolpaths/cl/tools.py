@@ -11,11 +11,17 @@ from dataclasses import dataclass, field
 from itertools import takewhile
 from typing import Literal, TypedDict
 
+import numpy as np
+
+from toolpaths.arrays import Floats
 from toolpaths.cl.build import ToolpathBuilder
 from toolpaths.cl.text.statements import Statement
 from toolpaths.toolpath import Tool
 
 TURNING = frozenset({"TURN", "GROOVE", "THREAD", "TURNING"})
+AXIS_AGREES = 2e-3
+_IN_PLANE = 1e-3
+"""of their spread, by which points may be off a plane"""
 _MAX_NUMBER = 10 ** 9
 _NOT_SHAPE = {"name", "length_register"}
 _CUTTER_ANGLES = (4, 5)
@@ -75,6 +81,15 @@ def is_rotating(b: ToolpathBuilder) -> bool:
     """Whether the tool in use is described as one that turns: a mill, a drill, a tap, no insert of a lathe."""
     shape = _state(b).fields.get("shape", "")
     return bool(shape) and shape not in TURNING
+
+
+def is_of_milling(axis: Floats, tip: Floats) -> bool:
+    """True where the axes (N, 3) of points (N, 3) lean, or the points lie in no plane."""
+    if len(tip) == 0 or np.abs(axis[:, :2]).max() > AXIS_AGREES:
+        return len(tip) > 0
+    away = tip - tip.mean(axis=0)
+    least, _, most = np.sqrt(np.maximum(np.linalg.eigvalsh(away.T @ away), 0.0)).tolist()
+    return bool(least > _IN_PLANE * most)
 
 
 def _renumber(state: _State, number: int) -> None:

@@ -11,17 +11,19 @@ ALIKE = 4
 """diagnostics of one code and one remedy up to which each is shown"""
 PLACED = frozenset({"travel.exceeded", "reach.axis", "reach.position", "link.blocked", "link.home", "path.jump"})
 """codes whose remedy is that of `place.found`, where that is said"""
-_MOVE, _LOWER = "move the part in the set-up (part.origin)", "lower clearance.margin"
-_SHORTER = "use a shorter tool (gauge_length)"
-WITHOUT_MOVE = {_MOVE: "", f"{_MOVE}, or {_LOWER}": _LOWER, f"{_MOVE}, turn it, or {_LOWER}": _LOWER,
-                f"{_MOVE}, {_LOWER}, or {_SHORTER}": f"{_LOWER}, or {_SHORTER}"}
+_MOVE, _SHORTER = "move the part in the set-up (part.origin)", "use a shorter tool (gauge_length)"
+_LOWER = "lower clearance.distance", "put clearance.centre nearer to the part", "lower clearance.margin"
+"""LOWER of postproc.setup.model, which a refusal need not load"""
+WITHOUT_MOVE = {_MOVE: "", f"{_MOVE}, or {_SHORTER}": _SHORTER, **{f"{_MOVE}, or {one}": one for one in _LOWER},
+                **{f"{_MOVE}, turn it, or {one}": one for one in _LOWER},
+                **{f"{_MOVE}, {one}, or {_SHORTER}": f"{one}, or {_SHORTER}" for one in _LOWER}}
 """remedies of travel and reach, and what is left of each where no place of the part fits"""
 FOLLOWS = {"cl.no-feed": ("feed.missing", "cl.feed", "convert.turning"), "cl.no-units": ("cl.empty", "convert.turning"),
            "cl.rapid-below": ("cl.cycle-depth",),
-           "setup.tool_unused": ("tool.number",), "place.found": ("path.odd_record",),
+           "setup.tool_unused": ("tool.number",),
            "joints.chosen": ("travel.exceeded", "reach.axis", "path.odd_record"),
-           **dict.fromkeys(PLACED, ("path.odd_record",))}
-"""by code: its causes; where one of them is said, people read that alone"""
+           **dict.fromkeys(PLACED | {"place.found"}, ("path.odd_record", "cl.units"))}
+"""by code: its causes; where one of them is an error, people read that alone"""
 CAUSES = {"setup.machine": PLACED, "setup.upside_down": PLACED, "cl.no-units": PLACED}
 """by code of a warning: errors that it may be the cause of; where one of them is said, it stands before them"""
 UNREAD = frozenset({"cl.form", "cl.continuation"})
@@ -37,7 +39,7 @@ def lines_of(diagnostics: tuple[Diagnostic, ...], least: Severity) -> list[str]:
     from toolpaths.diagnostics import Severity, has_errors
 
     if has_errors(diagnostics):
-        codes = {d.code for d in diagnostics}
+        codes = {d.code for d in diagnostics if d.severity is Severity.ERROR}
         unread = {(d.file, line) for d in diagnostics if d.code in UNREAD for line in d.lines}
         diagnostics = tuple(sorted((d for d in diagnostics if codes.isdisjoint(FOLLOWS.get(d.code, ()))
                                     and not _of_unread(d, unread)),

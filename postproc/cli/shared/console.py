@@ -216,7 +216,7 @@ def address_of(diagnostics: tuple[Diagnostic, ...]) -> str:
     """Where the page of the error that is to be put right first stands."""
     from toolpaths.diagnostics import Severity
 
-    codes = {d.code for d in diagnostics}
+    codes = {d.code for d in diagnostics if d.severity is Severity.ERROR}
     wrong = [d.code for d in diagnostics if d.severity is Severity.ERROR]
     first = next((code for code in wrong if codes.isdisjoint(FOLLOWS.get(code, ()))), wrong[0])
     return f"explained with an example: postproc explain {first}"

@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import machines
+import machines.analysis.box as box
 import machines.analysis.extremes as extremes
 import machines.analysis.report as report
 import machines.analysis.transmission as transmission
@@ -148,8 +149,9 @@ def test_reachable_box_of_a_serial_machine_is_its_travel() -> None:
 @pytest.fixture
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Few boxes and points: what more of them prove is in test_extremes_and_maps.py."""
-    for module, name, value in ((report, "GRID", (3, 3, 3, 2)), (report, "COARSE", (2, 2, 2, 2)), (extremes, "MOST", 20),
-                                (extremes, "START", 20), (transmission, "ROUNDS", 2)):
+    for module, name, value in ((report, "GRID", (3, 3, 3, 2)), (report, "COARSE", (2, 2, 2, 2)), (box, "POINTS", 3),
+                                (box, "STEPS", 16), (extremes, "MOST", 20), (extremes, "START", 20),
+                                (transmission, "ROUNDS", 2)):
         monkeypatch.setattr(module, name, value)
 
 

@@ -45,7 +45,7 @@ def made(which: str) -> Content:
     if which == "uranesx":
         return json.loads(certify(machines.load("uranesx"), Wanted()).text)
     if which == "bars":
-        return some_boxes("h4-rotary", [-20.0, -20.0, -90.0], [20.0, 20.0, -60.0])
+        return some_boxes("h4-rotary", [-8.0, -8.0, -66.0], [8.0, 8.0, -60.0])
     wanted = WantedOfChain(tool=100.0) if which == "mikron" else WantedOfChain(turns={"A": (0.2, 0.9)})
     return json.loads(certify_chain(machines.load("mikron-ucp710"), wanted).text)
 

@@ -116,6 +116,7 @@ def test_every_key_is_an_option_and_every_command_with_a_machine_and_a_cl_file_t
     on_cl_files = sorted(name for name, names in found.items() if {"machine", "dialect"} <= names)
     assert on_cl_files == ["convert", "orient", "place", "report", "setup align", "setup new", "time", "trace", "verify"]
     for name in on_cl_files:
+        assert {"units", "allow_unknown", "tolerance"} <= found[name], f"{name}: what one command reads, all do"
         got = run(*name.split(), *({"verify": ["x.nc"], "setup align": ["x.csv"]}.get(name, [])), part, "--no-such-option")
         assert re.search(r"postproc\.toml: .*machine mill-3axis", got.stderr), name
 
@@ -196,6 +197,10 @@ def test_its_units_never_go_against_those_of_a_file(part: Path, tmp_path: Path, 
     got = run("convert", part, "-o", out)
     assert got.exit_code == 1 and not out.exists() and "error [cl.units]" in got.stderr
     assert "for files that state none" in got.stderr
+    part.write_text(part.read_text().replace("GOTO/9,0", "GOTO/600,0"))
+    assert "travel.exceeded" not in run("convert", part, "-o", out).stderr, "what follows from the wrong unit is not said"
+    assert "travel.exceeded" in run("convert", part, "-o", out, "--units", "mm").stderr
+    part.write_text(part.read_text().replace("GOTO/600,0", "GOTO/9,0"))
     assert run("convert", part, "-o", out, "--units", "mm").exit_code == 0  # who says so on the command line knows the file
     assert "warning [cl.units]" in run("inspect", part, "--units", "mm").stderr
 

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 import machines
 from postproc.cli.app import app
+from postproc.cli.shared.causes import WITHOUT_MOVE
 from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile
 from tests.postproc.kit import NX, circle, codes, convert, execute, goto, machine, sample, tilted, toolpath
@@ -98,6 +99,15 @@ def test_no_room_above_the_part_is_refused() -> None:
     assert codes(result.diagnostics) & {"travel.exceeded", "link.blocked"} and not result.text
 
 
+def test_a_cut_beyond_travel_is_named_before_the_links_to_it() -> None:
+    """Lower links put no cut inside travel; the first approach was named, with the hint to lower it."""
+    setup = SetupFile.model_validate({"tools": {"1": {"gauge_length": 950.0}}})
+    result = convert(toolpath("RAPID", "GOTO/-900,0,60", "GOTO/-900,0,2", "GOTO/0,0,2"), "mill-3axis", setup=setup)
+    found = [d for d in result.diagnostics if d.code == "travel.exceeded" and "axis X" in d.message]
+    assert len(found) == 1 and "linking" not in found[0].message
+    assert found[0].hint == "move the part in the set-up (part.origin)"
+
+
 def test_tool_length_counts() -> None:
     """A gauge length of 120 lifts Z by 120."""
     path = toolpath("RAPID", "GOTO/0,0,5", "GOTO/1,0,5", "RAPID", "GOTO/1,0,250")
@@ -111,8 +121,19 @@ def test_tool_length_counts() -> None:
 def test_a_shorter_tool_is_advised_where_the_tool_has_a_length(length: float | None, advised: bool) -> None:
     setup = SetupFile.model_validate({"tools": {"1": {"gauge_length": length}} if length else {}})
     result = convert(toolpath("RAPID", "GOTO/0,0,390", "GOTO/1,0,390", "RAPID", "GOTO/1,0,420"), "mill-3axis", setup=setup)
-    hints = [d.hint for d in result.diagnostics if d.code == "travel.exceeded" and "in a linking move" in d.message]
+    hints = [d.hint for d in result.diagnostics if d.code == "travel.exceeded"]
     assert hints and all(("shorter tool" in hint) == advised for hint in hints)
+
+
+@pytest.mark.parametrize(("clearance", "advice"), [({"distance": 700.0}, "lower clearance.distance"),
+                                                   ({"centre": (0, 0, 900)}, "put clearance.centre nearer to the part"),
+                                                   ({}, "lower clearance.margin")])
+def test_the_key_that_brings_links_down_is_the_one_in_force(clearance: dict[str, object], advice: str) -> None:
+    setup = SetupFile.model_validate({"clearance": clearance, "tools": {"1": {"gauge_length": 250.0}}})
+    result = convert(toolpath("RAPID", "GOTO/0,0,100", "GOTO/1,0,149"), "mill-3axis", setup=setup)
+    hints = [d.hint for d in result.diagnostics if d.code == "travel.exceeded"]
+    assert hints and all(advice in hint for hint in hints)
+    assert all("move the part" not in WITHOUT_MOVE[hint] and advice in WITHOUT_MOVE[hint] for hint in hints)
 
 
 def test_rotary_travel_in_degrees() -> None:

@@ -149,6 +149,20 @@ def test_a_speed_of_0_is_none_and_the_set_up_counts(tables: str) -> None:
     assert errors(made([n.replace(",0,", ",-5,") for n in lines], of))[0].code == "spindle.speed"
 
 
+@pytest.mark.parametrize(("record", "side"), [("SPINDL/SFM,300,CLW", "M3"), ("SPINDL/120.0,SMM,CCLW", "M4"),
+                                              ("SPINDL/SMM,120,CLW,MAXRPM,6000", "M3")])
+def test_of_a_cutting_speed_the_set_up_states_the_turns(record: str, side: str, tmp_path: Path) -> None:
+    lines = ["UNITS/MM", "FEDRAT/MMPM,600", "LOADTL/1", "CUTTER/12,0", record, *CUT, "GOTO/0,10,30"]
+    refusal, = errors(made(lines))
+    assert refusal.code == "spindle.surface_speed" and "[tools.N]" in refusal.hint
+    of = setup(t1={"spindle": {"rpm": 2400}})
+    result = good(made(lines, of))
+    assert f"S2400 {side}" in switched(result.text)
+    (tmp_path / "p.nc").write_text(result.text.replace(f"S2400 {side}", f"S2500 {side}"))
+    changed = postproc.verify(tmp_path / "p.nc", toolpath(head=lines), machine("mill-3axis"), "linuxcnc", setup=of)
+    assert "verify.state" in {d.code for d in changed.diagnostics}
+
+
 def test_feeds_per_revolution_dwells_and_taps_count_with_it() -> None:
     of = setup({"spindle": {"rpm": 600}})
     assert "F60" in good(made([n.replace("MMPM,600", "MMPR,0.1") for n in HEAD], of)).text

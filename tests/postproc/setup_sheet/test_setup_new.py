@@ -361,6 +361,16 @@ def test_the_largest_speed_of_the_machine_is_asked_and_taken_at_most() -> None:
     assert "spindle.too_fast" in [d.code for d in facts_of(stated, slow, spec, Options()).refused]
 
 
+def test_of_a_cutting_speed_the_turns_at_the_diameter_are_offered() -> None:
+    path, _ = toolpaths.read_bytes("UNITS/MM\nLOADTL/1\nCUTTER/10,0\nSPINDL/SMM,157.08,CLW\nFEDRAT/MMPM,100\nGOTO/0,0,5\n"
+                                   "GOTO/1,0,5\nGOTO/1,1,5\nGOTO/1,1,9\n")
+    spec, _ = load_controller("linuxcnc")
+    assert spec is not None
+    facts = facts_of(path, machine("mill-3axis"), spec, Options())
+    (speed,) = [q for q in questions_of(facts) if q.kind == "spindle"]
+    assert not facts.refused and (speed.default, speed.assumed) == (5000, 5000) and "SPINDL/SMM,157.08" in speed.text
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="pseudo terminals are of Unix")
 def test_a_question_on_a_terminal_stays_on_its_line(tmp_path: Path) -> None:
     """A progress bar that is redrawn ten times a second wiped it out."""

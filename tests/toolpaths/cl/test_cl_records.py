@@ -195,6 +195,15 @@ def test_a_leaning_tool_axis_at_a_surface_speed_is_no_turning() -> None:
     assert [op.turning for op in p.operations] == [False]
 
 
+@pytest.mark.parametrize(("ends", "turning"), [(("20,0,-3", "20,15,-3"), [False]), (("20,0,-3", "35,0,-3"), [True]),
+                                               (("20,0,-3", "20,0.001,-3"), [True])])
+def test_points_in_no_plane_at_a_surface_speed_are_no_turning(ends: tuple[str, str], turning: list[bool]) -> None:
+    """What a lathe cuts lies in the plane of its spindle and the tip."""
+    p = read("UNITS/MM\nCUTTER/12,0\nSPINDL/SFM,300,CLW\nRAPID\nGOTO/0,0,40\nGOTO/0,0,-3\n" +
+             "".join(f"GOTO/{end}\n" for end in ends))
+    assert [op.turning for op in p.operations] == turning
+
+
 @pytest.mark.parametrize("text", ["SPINDL/ 500.0,SMM,CCLW\nTRNTYP/WORLD,0,0,0\nGOTO/1,2,3\n",
                                   "$$*CATIA0\nSPINDL/ 500.0,SMM,CCLW\n$$ OPERATION NAME : Face.1\nGOTO/1,2,3\n"])
 def test_turning_reported_before_its_operation_begins_is_of_that_operation(text: str) -> None:

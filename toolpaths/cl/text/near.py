@@ -1,4 +1,4 @@
-"""Words one edit apart: what a damaged byte makes of a word."""
+"""Words one edit apart: what a damaged byte, or two letters typed in the wrong order, make of a word."""
 
 from __future__ import annotations
 
@@ -10,13 +10,15 @@ _ANY = "\0"
 
 
 def one_edit(a: str, b: str) -> bool:
-    """True where one letter more, less or another makes `b` of `a`; False where they are the same."""
+    """True where one letter more, less or another, or two neighbours exchanged, make `b` of `a`; False where they are the
+    same."""
     if len(a) < len(b):
         a, b = b, a
     if a == b or len(a) - len(b) > 1:
         return False
     at = next((i for i in range(len(b)) if a[i] != b[i]), len(b))
-    return a[at + 1:] == b[at + (len(a) == len(b)):]
+    exchanged = len(a) == len(b) and a[at:at + 2] == b[at:at + 2][::-1] and a[at + 2:] == b[at + 2:]
+    return exchanged or a[at + 1:] == b[at + (len(a) == len(b)):]
 
 
 def nearest(word: str, vocabulary: Iterable[str]) -> str:
