@@ -42,7 +42,7 @@ SAMPLES, WEIGHTS = (one / 2.0 for one in np.polynomial.legendre.leggauss(5))
 
 @dataclass(frozen=True)
 @arrays(points="P A", first="M A", last="M A", along="M", owner="M", ends="N")
-class Curve:
+class FittedCurve:
     """M cubic pieces.
 
     Attributes:
@@ -65,7 +65,7 @@ class Curve:
         return np.asarray(np.max(angle, axis=0))
 
 
-def curve(flat: Floats, u: Floats, chord: Floats, smooth: Bools, tolerance: Floats) -> Curve:
+def curve(flat: Floats, u: Floats, chord: Floats, smooth: Bools, tolerance: Floats) -> FittedCurve:
     """The curve through points `flat` (N + 1, A), its blocks in directions `u` (N, A), of lengths `chord` (N,): inner points
     that are `smooth` (N - 1,) are of a curve and may move within their tolerance (N + 1,), others are corners."""
     turn = np.where(smooth, 2.0 * np.arcsin(np.clip(np.linalg.norm(np.diff(u, axis=0), axis=1) / 2.0, 0.0, 1.0)), 0.0)
@@ -77,7 +77,7 @@ def curve(flat: Floats, u: Floats, chord: Floats, smooth: Bools, tolerance: Floa
     points = np.concatenate([flat[:1], flat[owner] + part[:, None] * (u * chord[:, None])[owner]])
     points[ends + 1] = flat[1:]
     if not smooth.any():
-        return Curve(points, u, u, chord, owner, ends)
+        return FittedCurve(points, u, u, chord, owner, ends)
     joined = np.ones(len(points), dtype=bool)
     at = np.concatenate([[0], ends + 1])
     inner = np.concatenate([[False], smooth, [False]])
@@ -86,11 +86,11 @@ def curve(flat: Floats, u: Floats, chord: Floats, smooth: Bools, tolerance: Floa
     corner = BEFORE_CORNER * np.minimum(np.append(chord, chord[-1]), np.append(chord[0], chord))
     radius = np.full(len(points), FLATTEST)
     radius[at] = np.where(inner, np.concatenate([corner[:1], _radii(turn, chord), corner[-1:]]), corner)
-    return _laid(Curve(points, u[owner], u[owner], (chord / count)[owner], owner, ends), joined, at, stays,
+    return _laid(FittedCurve(points, u[owner], u[owner], (chord / count)[owner], owner, ends), joined, at, stays,
                  np.maximum(MOST * tolerance, FIXED), radius)
 
 
-def _laid(line: Curve, joined: Bools, at: Ints, stays: Floats, most: Floats, radius: Floats) -> Curve:
+def _laid(line: FittedCurve, joined: Bools, at: Ints, stays: Floats, most: Floats, radius: Floats) -> FittedCurve:
     """Pieces on straight blocks laid on the curve; `joined` (P,) ends at which the direction is one, `at` (N + 1,) rows of
     the commanded points, `stays` and `most` (N + 1,) mm by which they are expected to move and may, `radius` (P,) at the
     ends."""
@@ -117,7 +117,7 @@ def _radii(turn: Floats, chord: Floats) -> Floats:
     return np.asarray(np.where(turn > SHARP, narrow * radius, radius))
 
 
-def _of_curve(here: Curve, radius: Floats, rows: Ints) -> Floats:
+def _of_curve(here: FittedCurve, radius: Floats, rows: Ints) -> Floats:
     """(P,) radii of a curve at the ends of its pieces, at corners `rows` those that were given."""
     h, d = here.along[:, None], np.diff(here.points, axis=0)
     begin = np.linalg.norm(6.0 * d / h**2 - (4.0 * here.first + 2.0 * here.last) / h, axis=1)
@@ -133,7 +133,7 @@ def _around(radius: Floats, h: Floats) -> Floats:
     return np.asarray(np.minimum(np.minimum.accumulate(radius - s) + s, np.minimum.accumulate((radius + s)[::-1])[::-1] - s))
 
 
-def _lengths(here: Curve) -> Floats:
+def _lengths(here: FittedCurve) -> Floats:
     """(M,) lengths of the pieces."""
     d, h = np.diff(here.points, axis=0), here.along[:, None]
     total = np.zeros(len(h))
@@ -149,7 +149,7 @@ def _angle(one: Floats, other: Floats) -> Floats:
     return np.asarray(np.arccos(np.clip((one * other).sum(axis=1) / np.maximum(size, 1e-300), -1.0, 1.0)))
 
 
-def _least_rough(line: Curve, h: Floats, joined: Bools, weight: Floats, radius: Floats) -> Curve:
+def _least_rough(line: FittedCurve, h: Floats, joined: Bools, weight: Floats, radius: Floats) -> FittedCurve:
     """The curve of least sum of h (r^2 q''')^2 over the pieces, (r^2 jump of q'')^2/h over joined ends, and weight times
     (off the line)^2, by its normal equations; unknown is how far ends and directions are from the line's, by curve."""
     from scipy.linalg import solveh_banded  # loaded where a control's clock is asked for
@@ -186,7 +186,7 @@ def _least_rough(line: Curve, h: Floats, joined: Bools, weight: Floats, radius: 
         bands[k, 5 - k:] *= scale[5 - k:] * scale[:2 * n - (5 - k)]
     found = scale[:, None] * solveh_banded(bands, scale[:, None] * right, overwrite_ab=True, check_finite=False)
     first, last = u[row[:-1]] + found[2 * row[:-1] + 1], u[back[1:]] + found[2 * back[1:] + 1]
-    return Curve(line.points + found[2 * row], first, last, h, line.owner, line.ends)
+    return FittedCurve(line.points + found[2 * row], first, last, h, line.owner, line.ends)
 
 
 def _add(bands: Floats, right: Floats, factors: list[Floats], weight: Floats, rest: Floats) -> None:
