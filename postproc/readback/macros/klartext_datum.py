@@ -9,7 +9,7 @@ Cycle 8 (same manual, mirroring): 8.1 states the axes that are mirrored about th
 where one axis of the plane is mirrored circles and the side of the tool turn round. Here X and Y, in blocks of X, Y and Z.
 
 Cycle 10 (same manual, rotation): 10.1 states the angle of the plane about the datum in force, from the axis X, with I from
-the angle in force; 0 ends it. An axis that the first block behind it leaves out has no coordinate yet: that block states both.
+the angle in force; 0 ends it. An axis that the first block behind it leaves out has no coordinate yet: it states both.
 """
 
 from __future__ import annotations
