@@ -49,7 +49,7 @@ class DatumShift:
 
     Attributes:
         mirrored: axes of cycle 8; angle: degrees of cycle 10; side: L, R or 0, as the program states it
-        at: X and Y of the program in the turned plane, empty before a block states them
+        at: X and Y of the program under cycle 10, empty before a block states them
         other: row that has put a plane or the tip in force, "" for none; surface, pole: shifts under which a cycle and a
             pole were stated, which count from where the datum is when they are used
     """
