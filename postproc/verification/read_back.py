@@ -92,8 +92,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     """
     machine, control = job.machine, job.control
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
-    reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls,
-                        machine.clamp_codes)
+    reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls, machine.clamp_codes)
     _give(reader, job)
     code, diagnostics = reader.read(data, gcode, others)
     header = read_header(as_bytes(data[:HEADER]))
@@ -127,8 +126,8 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
                *check_stops(code, motion, job, faults), *check_clamps(whole, motion, job, comparison.owner, faults),
                *check_length_alone(data, whole, job, gcode), *check_options(code, motion, job, faults),
-               *check_index(motion, job, home, comparison.owner, faults),
                *check_safe_planes(motion, executed, job, home, comparison.owner, faults),
+               *check_index(motion, job, home, comparison.owner, faults),
                *check_hooks(data, code, motion, job, comparison.owner, faults),
                *check_stock(data, job, faults), *_bodies(motion, executed, job, comparison, faults)]
     noted = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
