@@ -11,7 +11,7 @@ import numpy as np
 
 from postproc.base.program_time import ControlPlan, ProgramTime
 from postproc.cycle_time.blocks import MotionBlocks
-from postproc.cycle_time.estimate import Estimate, estimate, executed_by, timed
+from postproc.cycle_time.estimate import Estimate, estimate, executed_by, slowed, timed
 from postproc.cycle_time.kinds import BY_FORMULAS, KINDS, kinds, time_by_kind
 from postproc.cycle_time.levels import stretch
 from postproc.cycle_time.model import CycleTimeModel, load_model, model_name
@@ -19,7 +19,7 @@ from postproc.cycle_time.phases import BlockTimes, summed
 from postproc.cycle_time.report import as_dict, clock
 from postproc.cycle_time.source import from_conversion
 from postproc.pipeline.result import PostResult
-from toolpaths.arrays import Bools, Floats
+from toolpaths.arrays import Bools
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import read_value
 
@@ -167,7 +167,7 @@ def sampled(blocks: MotionBlocks, model: CycleTimeModel) -> FormulaTimes:
     share = time_by_kind(blocks, made) / max(float(made.seconds.sum()), 1e-9)
     others = float(sum(share[k] * BY_FORMULAS[name] for k, name in enumerate(KINDS) if k != TURNING))
     off = float(np.hypot(others, share[TURNING] * max(STUDENT * scatter / factor, LEAST_OFF)))
-    return FormulaTimes(_scaled(made, blocks, np.where(turning, factor, 1.0)), off)
+    return FormulaTimes(slowed(made, blocks, np.where(turning, factor, 1.0)), off)
 
 
 def _pair(blocks: MotionBlocks, turning: Bools, model: CycleTimeModel, low: int) -> tuple[float, float] | None:
@@ -180,17 +180,6 @@ def _pair(blocks: MotionBlocks, turning: Bools, model: CycleTimeModel, low: int)
     if moved.found or not len(inner):
         return None
     return float(moved.seconds[inner].sum()), float(timed(part, model.quick()).seconds[inner].sum())
-
-
-def _scaled(times: BlockTimes, blocks: MotionBlocks, factor: Floats) -> BlockTimes:
-    """Times whose blocks take (E,) times as long; rests stay."""
-    p = blocks.pauses
-    inside = p.block >= 0
-    seconds = factor * times.seconds
-    rest = summed(times.pause[inside], p.block[inside], len(blocks))
-    end = float(times.begin[0]) + np.cumsum(seconds) + np.concatenate([[0.0], np.cumsum(rest)[:-1]])
-    columns = {name: factor * getattr(times, name) for name in ("ramp", "steady", "jerk", "lost_stop", "lost_corner")}
-    return replace(times, begin=end - seconds, end=end, **columns)
 
 
 def figures(e: Estimate | None) -> dict[str, Any]:

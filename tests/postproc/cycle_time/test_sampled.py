@@ -47,3 +47,13 @@ def test_formulas_in_the_place_of_the_control_have_their_band(monkeypatch: pytes
     b, m = turning(200), model("control")
     monkeypatch.setattr("postproc.cycle_time.control.MOST_BLOCKS", 10)
     assert estimate(b, ON, m).band == pytest.approx(estimate(b, ON, m.quick()).band)
+
+
+def test_times_by_formulas_are_never_below_the_bound() -> None:
+    """300,000 points that wind C: stretches held against the control scaled the formulas below what no control can beat."""
+    b, m = turning(200), model("control").quick()
+    whole = estimate(b, ON, m)
+    short = room.slowed(whole.timed, b, np.full(len(b), 0.5 * whole.lower_bound / whole.seconds))
+    lifted = estimate(b, ON, m, times=short)
+    assert lifted.seconds == lifted.lower_bound == pytest.approx(total(b, lifted.timed))
+    assert lifted.band[0] <= lifted.seconds < whole.seconds
