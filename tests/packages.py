@@ -16,7 +16,6 @@ import os
 import shutil
 import subprocess
 import sys
-import tarfile
 import tempfile
 import time
 from pathlib import Path
@@ -50,8 +49,7 @@ def build(folder: Path) -> tuple[Path, Path]:
     made.mkdir()
     text = "import sys; from setuptools.build_meta import build_sdist; build_sdist(sys.argv[1])"
     quiet([sys.executable, "-c", text, made], ROOT)
-    with tarfile.open(next(made.glob("*.tar.gz"))) as archive:
-        archive.extractall(folder / "sdist", filter="data")
+    shutil.unpack_archive(next(made.glob("*.tar.gz")), folder / "sdist")
     source = next((folder / "sdist").iterdir())
     quiet([sys.executable, "-m", "pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps",
            "--no-build-isolation", "-w", made, source], folder)

@@ -104,7 +104,7 @@ ANYTHING = {
     "postproc/feedrate/kernels/second_order.py": LOOP, "postproc/feedrate/kernels/splines.py": LOOP,
     "postproc/feedrate/kernels/tightening.py": LOOP, "postproc/feedrate/kernels/packing.py": LOOP,
     "postproc/feedrate/kernels/samples.py": LOOP, "postproc/readback/alignment/align.py": LOOP,
-    "postproc/witness/assign_blocks.py": LOOP, "postproc/report/residual_figure.py": DRAWN,
+    "postproc/witness/loops.py": LOOP, "postproc/report/residual_figure.py": DRAWN,
     "machines/calibration/figures.py": DRAWN, "machines/geometric_error/exchange/figures.py": DRAWN,
     "machines/geometric_error/__init__.py": LAZY, "postproc/__init__.py": LAZY,
     "machines/kinematics/base.py": "kinematics of a kind that only the form knows",

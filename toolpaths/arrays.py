@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import product
 from typing import Any, TypeVar
 
@@ -117,6 +117,11 @@ def as_slice(index: Ints) -> Ints | slice:
     if not len(index) or index[-1] - index[0] != len(index) - 1 or (np.diff(index) != 1).any():
         return index
     return slice(int(index[0]), int(index[-1]) + 1)
+
+
+def slices(count: int, most: int = 1 << 16) -> Iterator[slice]:
+    """Slices of a long array one behind the other, so that what is made of them meanwhile stays small; at least one."""
+    return (slice(first, min(first + most, count)) for first in range(0, max(count, 1), most))
 
 
 def read_only(values: npt.ArrayLike) -> Floats:

@@ -392,9 +392,9 @@ class Serial(Kinematics):
     def singular(self, q: Floats) -> Bools:
         """True (N,) where the tool lies along the rotary axis nearest the part, whose value is then free."""
         q = as_points(q, self.joints, "q")
-        if not (turns := self._turns):
-            return np.zeros(len(q), dtype=np.bool_)
-        _, carried = self._sweep(turns[1:], None, self._turning(q), [columns.of_one(np.zeros(3)),
-                                                                     columns.of_one(self.tool_axis)])
-        found = columns.along(turns[0].along, carried, ROUND_OFF)
-        return np.broadcast_to(found, (len(q),)).copy()
+        result, turns = np.zeros(len(q), dtype=np.bool_), self._turns
+        still = [columns.of_one(np.zeros(3)), columns.of_one(self.tool_axis)]
+        for part in columns.blocks(len(q)) if turns else ():
+            _, carried = self._sweep(turns[1:], None, self._turning(q[part]), still)
+            result[part] = columns.along(turns[0].along, carried, ROUND_OFF)
+        return result

@@ -183,7 +183,7 @@ def convert(file: ClFile, machine: MachineName, controller: ControllerName,
         result = replace(result, diagnostics=(*result.diagnostics, *why))
         # all before a file is written; under --quiet nobody asks for times, nor for figures without --json
         time = estimate_of(result, model, executed=bool(page)) if page or json or model or not SAYS.quiet else None
-        values = summary.as_dict(result, str(output), time) if json or not SAYS.quiet else {}
+        values = summary.as_dict(result, str(output), time if json else None) if json or not SAYS.quiet else {}
         text = "" if SAYS.quiet else summary.as_text(result, str(output), time, values)
         more = [] if result.ok else _offers(result, path, machine, controller)
         shown, of_tabs = pages(page, path, result, known, output.name, time)

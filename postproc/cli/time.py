@@ -106,8 +106,8 @@ def time(machine: MachineName,
     from postproc.cli.time_variants import Asked, answer, test_of_the_control
 
     unknown = tuple(w.upper() for w in allow_unknown or ())
-    options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, unknown, error_model=error_model, hooks=hooks,
-                      error_beyond=beyond)
+    options = Options(tolerance, axis_tolerance, "auto", setup, units, dialect, unknown, error_model=error_model,
+                      hooks=hooks, error_beyond=beyond)
     asked = Asked(tuple(files), (machine, *(with_machine or [])), controller, model, (setup, *(with_setup or [])),
                   tuple(what_if or ()), tuple(logs), output, override, options, csv, figure, check is not None, ending,
                   test, plan_seconds)

@@ -52,7 +52,7 @@ def commands_of(toolpath: Toolpath, moves: Moves, path: JointPath, controller: C
     writing.operations(None)
     result, diagnostics = writing.done()
     if not tool_call:
-        _without_length(result, controller)
+        _without_length(result, path, controller)
     for k in _dwells(toolpath, moves, path, native):
         result.setdefault(k[0], []).insert(0, k[1])
     return {k: tuple(v) for k, v in result.items() if v}, diagnostics
@@ -229,16 +229,19 @@ class _Writing:
         return self.result, lost + self.compensation.diagnostics(self.toolpath.file)
 
 
-def _without_length(commands: dict[int, list[Command]], controller: ControllerFile) -> None:
-    """The length register off at the program's beginning and wherever it may be taken up, where the safe start leaves it."""
+def _without_length(commands: dict[int, list[Command]], path: JointPath, controller: ControllerFile) -> None:
+    """The length register off at the program's beginning and wherever it may be taken up, where neither the safe start nor
+    the block that goes home has it so."""
     cancel = controller.codes.length_cancel
     if not cancel or any(cancel in block.split() for block in controller.program.preamble):
         return
-    for group in commands.values():
-        for k in range(len(group) - 1, -1, -1):
+    at_home = {int(k) for k in np.flatnonzero(path.home)} if controller.tools.home_without_length else set[int]()
+    for block, group in commands.items():
+        for k in range(len(group) - 1, -1 if block not in at_home else len(group), -1):
             if group[k].name == "OPERATION_START" and len(group[k].args) > 1:
                 group.insert(k + 1, Command("CANCEL_TOOL_LENGTH_OFFSET"))
-    commands.setdefault(0, []).insert(0, Command("CANCEL_TOOL_LENGTH_OFFSET"))
+    if 0 not in at_home:
+        commands.setdefault(0, []).insert(0, Command("CANCEL_TOOL_LENGTH_OFFSET"))
 
 
 def _gone(events: tuple[Event, ...], at: int) -> bool:

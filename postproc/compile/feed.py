@@ -13,7 +13,7 @@ from postproc.control.control import Control
 from postproc.control.word_arcs import PLANE_COLUMNS
 from postproc.controllers.model import FeedRules
 from postproc.path.model import ARC, TRAVERSE, JointPath
-from toolpaths.arrays import Array, Bools, Floats, Ints
+from toolpaths.arrays import Array, Bools, Floats, Ints, slices
 from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
@@ -71,9 +71,12 @@ def least_seconds(path: JointPath, control: Control, asked: Floats, step: Floats
         return control.machine.kinematics.drive_seconds(joints, path.q, drives.cutting_limits.velocity)
     cutting, rapid = control.machine.cutting_limits.velocity, control.machine.limits.velocity
     velocity = cutting if cutting is rapid else np.where((path.code == TRAVERSE)[:, None], rapid, cutting)
-    travel = np.abs(path.q - joints)
-    joint = np.array([f.control.law == "axes" for f in path.frames])[path.frame][:, None] | np.array(control.machine.rotary)
-    needed = (np.where(joint, np.maximum(travel, np.abs(step) / control.unit), travel) / velocity).max(axis=1)
+    own, needed = np.array([f.control.law == "axes" for f in path.frames]), np.empty(len(path))
+    for part in slices(len(path)):
+        travel = np.abs(path.q[part] - joints[part])
+        joint = own[path.frame[part]][:, None] | np.array(control.machine.rotary)
+        most = velocity if velocity.ndim == 1 else velocity[part]
+        needed[part] = (np.where(joint, np.maximum(travel, np.abs(step[part]) / control.unit), travel) / most).max(axis=1)
     arc = (path.code == ARC) & ~_control_bends(path)
     if arc.any():
         top = asked / cutting[control.xyz].min()

@@ -13,7 +13,7 @@ from postproc.control.word_arcs import PLANE_AXIS
 from postproc.control.word_grid import WordGrid
 from postproc.path.model import ARC, FEED, JointPath
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Bools, Floats, Ints, distinct
+from toolpaths.arrays import Bools, Floats, Ints, distinct, slices
 from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
@@ -67,8 +67,9 @@ def unrounded_words(path: JointPath, q: Floats, rows: Ints, tool: Ints, kinemati
     for k in groups(path.frame[rows], tool[rows]):
         index = int(tool[rows[k[0]]])
         law, kin = path.frames[int(path.frame[rows[k[0]]])].control, kinematics(index)
-        at = q[k] if rounds is None or law.law != "axes" else _made_up(q[k], law, kin, rounds)
-        words[k] = law.words(at, kin, lengths(index))
+        for some in (k[part] for part in slices(len(k))):
+            at = q[some] if rounds is None or law.law != "axes" else _made_up(q[some], law, kin, rounds)
+            words[some] = law.words(at, kin, lengths(index))
     return words
 
 

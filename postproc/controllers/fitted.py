@@ -24,7 +24,9 @@ def fitted(controller: ControllerFile, options: ControlOptions) -> ControllerFil
     inch = controller.inch.model_copy(update={"relies_on": options.unconfirmed(controller.inch.relies_on)})
     rules: dict[Literal["shortest", "sign"], str] = {
         rule: text for rule, text in controller.rollover.needs.items() if options.unconfirmed((text,))}
+    alone = "".join(options.unconfirmed((controller.tools.length_alone,)))
     return controller.model_copy(update={
+        "tools": controller.tools.model_copy(update={"length_alone": alone}),
         "inch": inch, "rollover": controller.rollover.model_copy(update={"needs": rules}),
         "modes": _fitted_modes(controller.modes, options), "arcs": _fitted_arcs(controller.arcs, options),
         "program": _fitted_program(controller.program, options), "codes": codes, "cycles": cycles, "start": start})
@@ -32,8 +34,7 @@ def fitted(controller: ControllerFile, options: ControlOptions) -> ControllerFil
 
 def _fitted_modes(modes: Modes, options: ControlOptions) -> Modes:
     """The modes that the control has; the frame of the tip as the machine file confirms it."""
-    tcp, tilted = (mode and mode.model_copy(update={"relies_on": options.unconfirmed(mode.relies_on),
-                                                    "alone": "".join(options.unconfirmed((mode.alone,)))})
+    tcp, tilted = (mode and mode.model_copy(update={"relies_on": options.unconfirmed(mode.relies_on)})
                    for mode in (modes.tcp, modes.tilted))
     if tcp is not None and options.tip_frame:
         tcp = tcp.model_copy(update={"frame": options.tip_frame})

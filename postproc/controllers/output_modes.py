@@ -22,6 +22,8 @@ class Mode(UserModel):
     """blocks that switch it off"""
     start: tuple[str, ...] = ()
     """blocks of the safe start, in programs that use the mode"""
+    lifted: tuple[str, ...] = ()
+    """the same, where they stand behind the block that goes home: the length is off there ([tools] home_without_length)"""
     option: str = ""
     """the option of the control that the mode is: a comment likewise, where the machine file does not confirm it"""
     relies_on: tuple[Annotated[str, placeholders("work_offset")], ...] = ()
@@ -29,8 +31,6 @@ class Mode(UserModel):
     is the name of the work offset"""
     length: LengthState = "any"
     """how the length register must stand where the mode is entered, and where its `leave` blocks begin"""
-    alone: str = ""
-    """a setting that it needs where the length register is switched off in a block of its own, not on the path to home"""
     arcs: bool = True
     """arcs may stand in it while the rotary axes stand still"""
     arc_planes: tuple[Literal[17, 18, 19], ...] = (17, 18, 19)

@@ -285,6 +285,9 @@ class Tools(UserModel):
     """by number: the name by which the control calls a tool; [tools.N] called of the set-up goes before it"""
     home_without_length: bool = False
     """blocks in machine coordinates switch the length register off"""
+    length_alone: str = ""
+    """a setting that programs need in which the length register changes in a block that states no height: a comment in
+    the header, and `verify` asks for it; empty: such a block moves nothing"""
     cutting_edges: bool = False
     """a tool has cutting edges D1 to D9, so that a register 2 to 9 of the CL file may be one: refused"""
 

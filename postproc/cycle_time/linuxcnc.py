@@ -262,6 +262,7 @@ def _timed(blocks: MotionBlocks, s: PlannerSegments, row: Row, settings: Setting
     clock = chosen(timeline, len(row.length), KERNEL_FROM)
     begin, end = clock(r.seconds + settling, overlap, resting, row.fresh)
     end[-1:] += SETTLED
+    del behind, inside, most, target, ahead, gentle, overlap, settling, resting  # a long program's columns
     return _by_block(blocks, s, row, r.up + r.down, r.steady, begin, end, pause, stops, first, last, r.peak)
 
 
@@ -326,6 +327,7 @@ def _by_block(blocks: MotionBlocks, s: PlannerSegments, row: Row, ramp: Floats, 
     span = merged_end - merged_begin
     finish = merged_begin[owner] + done * span[owner]
     start = finish - part * span[owner]
+    del begin, end, merged_begin, merged_end, missing, own, total, done, first_of, span
     loss_first, loss_last = ((peak - v) ** 2 / (2.0 * row.rate * np.maximum(peak, 1e-300)) for v in (first, last))
     stopped_before = np.concatenate([[True], stops[:-1]])
     lost_stop = np.where(stopped_before, loss_first, 0.0) + np.where(stops, loss_last, 0.0)

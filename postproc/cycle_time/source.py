@@ -184,7 +184,7 @@ def _executed(data: bytes, controller: ControllerFile, controls: dict[str, Contr
     numbers = [reader.offset_of(program.offset_text(code)) for code in controls]
     offsets = Offsets(control.work_offset, control.xyz, lengths, home, control.length_on_z, controller.cycles.peck_relief,
                       control, reader.rises_first, reader.arc_slack, tuple(zip(numbers[1:], further, strict=True)),
-                      radii, controller.cutter_compensation.corners)
+                      radii, controller.cutter_compensation.corners, reader.home_in_planes)
     motion, more = run(code, machine.axis_names, offsets, file)
     return code, motion, [*found, *more]
 

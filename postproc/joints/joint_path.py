@@ -6,7 +6,7 @@ import numpy as np
 
 from machines.kinematics.base import Kinematics
 from postproc.joints.tracks import distance
-from toolpaths.arrays import Floats, Ints, repeated
+from toolpaths.arrays import Floats, Ints, repeated, slices
 from toolpaths.rotations import angle_between, wrap
 
 
@@ -16,12 +16,13 @@ def reachable_axes(kin: Kinematics, axis: Floats, tolerance: float) -> tuple[Flo
     Directions of a CL file carry rounding, so that an axis on the edge of the reachable set may stand just
     outside: those within `tolerance` (rad) are moved onto it, others stay as they are.
     """
-    nearest = kin.nearest_axis(axis)
-    off = angle_between(nearest, axis)
+    off = np.concatenate([angle_between(kin.nearest_axis(axis[part]), axis[part]) for part in slices(len(axis))])
     use = (off > 0.0) & (off <= tolerance)
     if not use.any():
         return axis, repeated(0.0, len(axis))
-    return np.where(use[:, None], nearest, axis), np.where(use, off, 0.0)
+    moved = np.array(axis)
+    moved[use] = kin.nearest_axis(axis[use])
+    return moved, np.where(use, off, 0.0)
 
 
 def nearest_solution(kin: Kinematics, tip: Floats, axis: Floats, near: Floats,

@@ -10,7 +10,7 @@ import postproc.path.faults as faults
 from machines.kinematics.base import Kinematics
 from postproc.control.modes import CONSTANT, OutputModes, WordFrame, turning_run
 from postproc.joints.run_plan import RunPlan
-from toolpaths.arrays import Bools, Floats, Ints, distinct
+from toolpaths.arrays import Bools, Floats, Ints, distinct, slices
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.rotations import angle_between
@@ -86,8 +86,9 @@ def _still(axis: Floats, starts: Ints, axis_tolerance: float) -> Bools:
     """(runs,) True where the tool axes of a run are one within a share of the tolerance (rad)."""
     if axis.strides[0] == 0 or not len(starts):
         return np.ones(len(starts), dtype=np.bool_)
-    of_first = np.repeat(axis[starts], np.diff(np.append(starts, len(axis))), axis=0)
-    near = angle_between(axis[starts[0]:], of_first) <= CONSTANT * axis_tolerance
+    first, own = np.repeat(starts, np.diff(np.append(starts, len(axis)))), axis[starts[0]:]
+    near = np.concatenate([angle_between(own[part], axis[first[part]]) for part in slices(len(own))]) <= (
+        CONSTANT * axis_tolerance)
     return np.asarray(np.logical_and.reduceat(near, starts - starts[0]))
 
 

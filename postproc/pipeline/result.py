@@ -86,7 +86,8 @@ class PostResult:
     """name of the last stage that ran, "" where none did"""
     keep: Keep = "all"
     """"summary": path, program and feeds are let go once the text is written, and `figures` say what a summary needs of
-    them; kept where a stage or a summary works on them still (`written_figures.is_summed_up`), or an ERROR is found"""
+    them, tips and axes of `comparison` are NaN; kept where a stage or a summary works on them still
+    (`written_figures.is_summed_up`), or an ERROR is found"""
     figures: WrittenFigures | None = None
     """of path and program, where these are let go"""
 

@@ -104,6 +104,8 @@ def staged(result: PostResult, progress: Progress | None = None,
         if stage.name == "write" and begun.keep == "summary" and is_summed_up(made.job, made.machine):
             figures = written_figures(made.job, made.toolpath, made.path, made.program, made.feeds)
             made, result = without_path(made), replace(result, figures=figures, path=None, program=None, feeds=None)
+    if result.figures is not None and result.comparison is not None:
+        result = replace(result, comparison=result.comparison.without_poses())
     return replace(result, text=made.text, files=made.files)
 
 

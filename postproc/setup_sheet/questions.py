@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import shlex
@@ -9,6 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import field
 from typing import Literal, get_args
 
+from machines.sheet.quantity import QuantityKind, WrongFigureError, read_quantity
 from postproc.setup.spindle import CoolantKind
 from postproc.setup_sheet.facts import NumberedTool, SheetFacts, ToolFacts
 from toolpaths.choices import LengthUnit
@@ -28,6 +30,8 @@ _LARGEST: dict[QuestionKind, float] = {"tool_number": 999999.0, "gauge_length": 
                                        "feed": 200000.0, "origin": 100000.0}
 _UNITS: dict[QuestionKind, str] = {"tool_number": "", "gauge_length": "mm", "spindle": "rev/min", "feed": "mm/min",
                                    "coolant": "", "origin": "mm", "units": ""}
+_MEASURES: dict[QuestionKind, tuple[QuantityKind, float]] = {"gauge_length": ("length", 1.0), "feed": ("speed", 60.0)}
+"""answers that may come with a unit; how many of the question's unit one of read_quantity is"""
 _OPTIONS: dict[QuestionKind, str] = {"tool_number": "--tool-number", "gauge_length": "--gauge-length",
                                      "spindle": "--spindle", "feed": "--feed", "coolant": "--coolant", "origin": "--origin",
                                      "units": "--units"}
@@ -182,6 +186,10 @@ def parsed(question: Question, text: str) -> tuple[float | str | None, str]:
         return (text.lower(), "") if text.lower() in known else (None, f"{text!r} is not one of {', '.join(known)}")
     if question.kind == "origin":
         return (text, "") if three_numbers(text) else (None, f"{text!r} is not x, y, z in mm")
+    if question.kind in _MEASURES:  # "4.35 in", "20 ipm"
+        measure, share = _MEASURES[question.kind]
+        with contextlib.suppress(WrongFigureError):
+            text = f"{read_quantity(text, measure) * share:.12g}"
     text = text.removesuffix(_UNITS[question.kind]).rstrip() if _UNITS[question.kind] else text
     text = text.removesuffix("rpm").rstrip() if question.kind == "spindle" else text
     if _thousands(text):

@@ -239,7 +239,8 @@ class _Look:
         done = np.flatnonzero(self.c.match >= 0)
         rows, tolerance = self.c.match[done], self.job.options.tolerance
         if not self.matters:
-            keep = ~self._taken_up(self.motion.end[rows], self.again.end[rows])
+            keep = np.concatenate([~self._taken_up(self.motion.end[k], self.again.end[k]) for k in np.array_split(
+                rows, len(rows) // CHUNK + 1)])
             done, rows = done[keep], rows[keep]
         for first in range(0, len(rows), CHUNK):
             part = slice(first, first + CHUNK)

@@ -26,7 +26,7 @@ from postproc.readback.comparison.states import check_lengths, registers_of
 from postproc.readback.comparison.stock import check_stock
 from postproc.readback.comparison.stops_and_dwells import check_stops
 from postproc.readback.comparison.tool_changes import check_changes
-from postproc.readback.comparison.unstated_codes import check_stated
+from postproc.readback.comparison.unstated_codes import check_length_alone, check_stated
 from postproc.readback.dialects.base import ASSUMED, UNITS_UNSTATED, Reader, as_bytes
 from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion, run
@@ -92,8 +92,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     """
     machine, control = job.machine, job.control
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
-    reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls,
-                        machine.clamp_codes)
+    reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls, machine.clamp_codes)
     _give(reader, job)
     code, diagnostics = reader.read(data, gcode, others)
     header = read_header(as_bytes(data[:HEADER]))
@@ -119,14 +118,16 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     executed = executed_poses(job, motion, offsets.lengths)
     with np.errstate(invalid="ignore"):
         called = {name: others[name] for name, _ in code.files[1:]} if others else {}
-        planned, changed = planned_feeds(as_bytes(data), called, gcode or job.toolpath.file)
+        planned, changed = (
+            planned_feeds(as_bytes(data), called, gcode or job.toolpath.file) if header.planned else (False, []))
         comparison = compare(code, motion, job, executed, gcode, planned)
     job = job.with_moves(comparison.moves)
     lengths = [] if any(d.code == "verify.state" for d in comparison.diagnostics) else check_lengths(motion, job, faults)
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
                *check_stops(code, motion, job, faults), *check_clamps(whole, motion, job, comparison.owner, faults),
-               *check_options(code, motion, job, faults), *check_index(motion, job, home, comparison.owner, faults),
+               *check_length_alone(data, whole, job, gcode), *check_options(code, motion, job, faults),
                *check_safe_planes(motion, executed, job, home, comparison.owner, faults),
+               *check_index(motion, job, home, comparison.owner, faults),
                *check_hooks(data, code, motion, job, comparison.owner, faults),
                *check_stock(data, job, faults), *_bodies(motion, executed, job, comparison, faults)]
     noted = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
@@ -145,7 +146,7 @@ def _offsets(job: Job, reader: Reader, home: Floats) -> Offsets:
     radii = tuple((tool.number, tool.radius) for tool in job.cutcom if tool.radius)
     return Offsets(job.control.work_offset, job.control.xyz, job.register_lengths(), home, job.control.length_on_z,
                    job.controller.cycles.peck_relief, job.control, reader.rises_first, reader.arc_slack,
-                   _others(job, reader), radii, job.controller.cutter_compensation.corners)
+                   _others(job, reader), radii, job.controller.cutter_compensation.corners, reader.home_in_planes)
 
 
 def _give(reader: Reader, job: Job) -> None:

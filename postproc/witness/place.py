@@ -76,10 +76,12 @@ class Poses:
         tools, number = self.case.setup.get("tools", {}), self.executed.tool[rows]
         if not (self.case.setup.get("output") or {}).get("tool_call", True):
             number = np.full(len(rows), self.uncalled)
-        result = np.zeros(len(rows))
+        if len(rows) and (number == number[0]).all():
+            number = number[:1]
+        result = np.zeros(len(number))
         for n in sorted(set(number.tolist())):
             result[number == n] = float((tools.get(str(int(n))) or {}).get("gauge_length") or 0.0)
-        return result
+        return np.broadcast_to(result, len(rows)) if len(result) == 1 else result
 
     def before(self, rows: Array) -> Array:
         """(K, J) joints where blocks begin."""

@@ -148,9 +148,11 @@ def _needed(w: Walked, rows: Array, slow: Array, pace: Array, table: dict[str, A
     """(M,) s of the targets `slow` where every block takes what the feed, `pace` (M,) s/mm, and the
     velocities of the axes ask for."""
     result = np.zeros(len(w.targets))
-    here = rows[np.isin(w.owner[rows], slow)]
-    if len(here):
-        _, speed = limits_of(table, w.poses.executed.letters)
+    late, (_, speed) = np.append(np.zeros(len(result), bool), False), limits_of(table, w.poses.executed.letters)
+    late[slow] = True
+    for first in range(0, len(rows), CHUNK):
+        here = rows[first:first + CHUNK]
+        here = here[late[w.owner[here]]]
         step = w.tip[here] - w.tip[np.maximum(here - 1, 0)]
         q, most = w.poses.before(here), np.sqrt(np.einsum("ni,ni->n", step, step)) * pace[w.owner[here]]
         most = np.maximum(most, 60.0 * w.length[here] / largest_feed(table))

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.witness.assign_blocks import walk
 from postproc.witness.commanded import ARC, HOLE, LINE, RAPID, START, Commanded
+from postproc.witness.loops import walk
 from postproc.witness.place import Poses
 from postproc.witness.splines import length_of, off_chords
 from postproc.witness.text import Array

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from postproc.witness.loops import at_once
+
 Array = np.ndarray[Any, np.dtype[Any]]
 Word = float | str
 JOIN = b"\x01"
@@ -32,6 +34,8 @@ _TEXT = re.compile(rb"[ \t]*(?:" + "|".join(TEXT_WORDS).encode() + rb")", re.IGN
 _STATEMENT = re.compile(rb"[ \t]*(?:" + "|".join(TEXT_WORDS).encode() + rb"|(?:RAPID|FINI|END|STOP|OPSTOP|GOHOME|ENDSUB)\b"
                         rb"|\$\$|[A-Z][\w ,-]*/)", re.IGNORECASE)
 _CHUNK = 1 << 23
+COMPILED_FROM = 1_500_000
+"""characters of a text whose plain lines are worth compiled code"""
 _DEEP = 10
 
 
@@ -99,7 +103,8 @@ def read(data: bytes) -> ClText:
     """Records and points of a CL file in the order in which they are executed."""
     text = _plain(data)
     text, line_of = _written_out(text)
-    spans = [m.span() for m in _OTHER.finditer(text)]
+    rows, spans = at_once(text) if len(text) >= COMPILED_FROM else (None, [])
+    spans = [m.span() for m in _OTHER.finditer(text)] if rows is None else spans
     real = _places(text, 10)
     ends = np.union1d(real, _places(text, JOIN[0])) if JOIN in text else real
     kept = list(zip([0, *(last + 1 for _, last in spans)], [*(first for first, _ in spans), len(text)], strict=True))
@@ -107,7 +112,7 @@ def read(data: bytes) -> ClText:
     rest = text[kept[-1][0]:]
     lengths[-1] += bool(rest.strip()) and not rest.endswith(b"\n")
     before = np.cumsum(lengths)
-    rows = _numbers(memoryview(text), kept)
+    rows = _numbers(memoryview(text), kept) if rows is None else rows
     starts = np.searchsorted(ends, [first for first, _ in spans]) if spans else np.zeros(0, np.int64)
     found = [_record(text[first:last]) for first, last in spans]
     used = [k for k, r in enumerate(found) if r.major or r.body]

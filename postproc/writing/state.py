@@ -37,7 +37,8 @@ class WriterState:
     `taken` are block numbers that subprograms have; `stock` (2, 3) least and greatest X, Y, Z of the stock;
     `levels`
     smoothing of operations by name, `level` the blocks of the one in force; `ahead` the axis words of a stretch of
-    blocks, and the first of them.
+    blocks, and the first of them; `at` the block that the command at hand stands before, `waiting` blocks of the safe start
+    that stand behind it.
     """
 
     def __init__(self, controller: ControllerFile, program: Program, cycles: tuple[Cycle, ...], length_offsets: bool,
@@ -68,6 +69,7 @@ class WriterState:
         self.flowing = 0
         self.taken: set[int] = set()
         self.ahead: tuple[int, list[str]] = (0, [])
+        self.at, self.waiting = 0, list[str]()
         self.restate()
 
     def at_place(self, place: int) -> list[str]:
@@ -85,8 +87,7 @@ class WriterState:
         needed = [text.replace("{work_offset}", self.offset_names) for mode in modes
                   for text in (mode.option, *mode.relies_on) if text]
         p, rules = self.program, self.controller
-        alone = any(s.law == "tilted" and math.isnan(s.out) for s in p.sections)
-        needed += [mode.alone for mode in modes if alone and mode.alone]
+        needed += [rules.tools.length_alone] if rules.tools.length_alone and self.length_alone() else []
         arcs = np.flatnonzero(p.code == ARC)
         third = [p.letters.index("ZYX"[plane - 17]) for plane in p.plane[arcs].tolist()]
         rising = p.words[arcs, third] != p.words[arcs - 1, third]
@@ -96,6 +97,24 @@ class WriterState:
                   (rules.cycles.rigid_option, taps), (rules.cycles.falling_relies_on, falling),
                   (rules.splines.relies_on, bool((p.spline >= 0).any())))
         return needed + [text for text, used in others if text and used]
+
+    def goes_home(self, block: int) -> bool:
+        """True where a block goes home, and no switch at the control leaves it out."""
+        p = self.program
+        return block < len(p) and bool(p.home[block]) and not p.skip[block]
+
+    def used_modes(self) -> list[Mode]:
+        """The modes of the program's sections."""
+        laws = {section.law for section in self.program.sections}
+        modes = {"tcp": self.controller.modes.tcp, "tilted": self.controller.modes.tilted}
+        return [mode for law, mode in modes.items() if mode is not None and law in laws]
+
+    def length_alone(self) -> bool:
+        """True where a length register changes in a block that states no height: where a mode takes it, where a plane is
+        left elsewhere than on the path to home, or where the program has no block that goes home."""
+        modes = [(section, mode) for section in self.program.sections if (mode := self.mode_of(section)) is not None]
+        return any("{register}" in block for _, mode in modes for block in mode.enter) or any(
+            mode.length == "off" and math.isnan(section.out) for section, mode in modes)
 
     def restate(self) -> None:
         """State motion code and feed with the next block."""

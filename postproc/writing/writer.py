@@ -13,7 +13,6 @@ from postproc.compile.clamps import CLAMP, UNCLAMP
 from postproc.compile.hooks import HOOK
 from postproc.compile.program import PER_MINUTE, Command, Hole
 from postproc.control.rollover import HALF
-from postproc.controllers.output_modes import Mode
 from postproc.controllers.texts import blocks_of
 from postproc.reference.coolant import COMMANDS
 from postproc.writing.state import NUMBER_ROOM, WriterState, plain_name, without_off
@@ -122,20 +121,19 @@ class Writer(WriterState, ABC):
         return left + [kept for block in (*program.path_tolerance_off, *program.ending) if (kept := without_off(block, off))]
 
     def start(self) -> Iterator[str]:
-        """Safe start: modes that the program uses off, then the preamble."""
+        """Safe start: modes that the program uses off, then the preamble; what must not see a length waits for the block
+        that goes home."""
         for mode in self.used_modes():
             yield from mode.start
+            if self.goes_home(self.at):
+                self.waiting += mode.lifted
+            elif mode.lifted:
+                yield from (self.controller.codes.length_cancel, *mode.lifted)
         yield from self.controller.rollover.on if self.program.rolls else ()
         if (self.program.plane[self.program.code == 2] > 17).any():
             yield from self.controller.arcs.start
         for block in self.controller.program.preamble:
             yield from blocks_of(block.replace("{work_offset}", self.work_offset).replace("{units}", self.units))
-
-    def used_modes(self) -> list[Mode]:
-        """The modes of the program's sections."""
-        laws = {section.law for section in self.program.sections}
-        modes = {"tcp": self.controller.modes.tcp, "tilted": self.controller.modes.tilted}
-        return [mode for law, mode in modes.items() if mode is not None and law in laws]
 
     def relies_on(self) -> list[str]:
         """Settings of the control that the program needs, each once."""
@@ -181,7 +179,7 @@ class Writer(WriterState, ABC):
         switch = np.flatnonzero(np.diff(p.skip)) + 1
         curves = set(np.flatnonzero((p.curve >= 0) | (p.spline >= 0)).tolist())
         stops = sorted({*p.commands, *(h.first for h in p.holes), *(h.last + 1 for h in p.holes), *switch.tolist(), *curves,
-                        len(p)})
+                        *(k + 1 for k in (0, *p.commands) if self.goes_home(k)), len(p)})
         holes = {h.first: h for h in p.holes}
         at = 0
         for stop in stops:
@@ -189,8 +187,11 @@ class Writer(WriterState, ABC):
                 yield from self.end_cycle()
                 yield from self.blocks(at, stop) if not p.skip[at] else map(SKIP.__add__, self.blocks(at, stop))
                 at = stop
+                yield from self.waiting
+                self.waiting = []
             for command in p.commands.get(stop, ()):
                 yield from self.end_cycle()
+                self.at = stop
                 yield from self.command(command) if not command.skip else map(SKIP.__add__, self.command(command))
             if stop in holes:
                 yield from self.hole(holes[stop])
@@ -320,7 +321,7 @@ class Writer(WriterState, ABC):
         stated = {word for block in blocks for word in block.split()}
         self.plane = 17 if self.controller.codes.planes["17"] in stated else 0
         self.mode = PER_MINUTE if self.controller.codes.per_minute in stated else -1
-        self.length_off |= self.controller.codes.length_cancel in stated
+        self.length_off = self.controller.codes.length_cancel in stated or (self.length_off and not restart)
         numbers = self.controller.format.sequence_step and self.controller.format.sequence_prefix == "N"
         yield from (f"{NEXT}{block}" if numbers and _HUNDRED.match(block) else block for block in blocks)
 

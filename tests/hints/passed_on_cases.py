@@ -64,7 +64,7 @@ _HOLES = [
 ]
 _PROGRAMS = [
     edited("verify.start", CUT, "G0 X0. Y0.\n", "G0 X0.\n", "state Y, absolutely"),
-    edited("verify.tool_change", "COOLNT/ON\n" + CUT + "LOADTL/2\n" + CUT, "M9\nG49\nT2 M6", "G49\nT2 M6", "M9 before it"),
+    edited("verify.tool_change", "COOLNT/ON\n" + CUT + "LOADTL/2\n" + CUT, "M9\nT2 M6", "T2 M6", "M9 before it"),
     of("gcode.tool_length", "siemens-840d", "", "G18 G2 X3 Z50 I1 K0 F200\n", "", r"state \$SC_TOOL_LENGTH_CONST=17"),
     of("gcode.units_unstated", "fanuc-30i", "G21 G90", "G90", "G21 G90", "state G20 or G21"),
 ]

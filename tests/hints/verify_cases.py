@@ -26,8 +26,8 @@ def edited(code: str, text: str, old: str, new: str, says: str, *does: Edit, mac
 
 
 _EDITED = [
-    edited("verify.end", CUT, "G53 G0 Z400.\nG53 G0 X0. Y0.\n", "", "retract to home before the end is missing",
-           Edit("p.nc", "G05.1 Q0\nM9", "G53 G0 Z400.\nG53 G0 X0. Y0.\nG05.1 Q0\nM9")),
+    edited("verify.end", CUT, "G53 G0 G49 Z400.\nG53 G0 X0. Y0.\n", "", "retract to home before the end is missing",
+           Edit("p.nc", "G05.1 Q0\nM9", "G53 G0 G49 Z400.\nG53 G0 X0. Y0.\nG05.1 Q0\nM9")),
     edited("verify.feed", DOWN, "F44122.6982", "F88000.", "the feed of the slowest axis", setup=FED),
     edited("verify.tap", TAP, "F1000.", "F900.", "feed = pitch times speed"),
     edited("verify.state", LEFT + ARC + "CUTCOM/OFF\nGOTO/-20,20,2\nRAPID\nGOTO/-20,20,20\n",
@@ -36,7 +36,9 @@ _EDITED = [
     edited("verify.kind", CUT, "G0 X0. Y0.\nG43 H1 Z67", "G1 X0. Y0. F900.\nG0 G43 H1 Z67", "rapid motion"),
     edited("gcode.unstated", CUT, "G17 ", "", "state (G17).* at the start of the program",
            Edit("p.nc", "G21 G40", r"\1 G21 G40")),
-    edited("gcode.unstated", TILTED, "G49\nG69\n", "G49\n", "state (G69) at the start of the program",
+    edited("verify.length_alone", CUT, "G53 G0 G49 Z400.\nG53 G0 X", "G49\nG53 G0 Z400.\nG53 G0 X",
+           r"in the one that goes home \((G53 G0 G49) Z\)", Edit("p.nc", "G49\nG53 G0 Z", r"\1 Z")),
+    edited("gcode.unstated", TILTED, "G49 Z250.\nG69\n", "G49 Z250.\n", "state (G69) at the start of the program",
            Edit("p.nc", "G21 ", r"\1 G21 "), machine="mikron-ucp710", more=" --output-mode tilted"),
     edited("gcode.unstated", TURNING, "TRAORI\nN140 G54\n", "TRAORI\n", "state the work offset .* again behind it",
            Edit("p.nc", "TRAORI\n", "TRAORI\nG54\n"), machine="mikron-ucp710", control="siemens-840d",

@@ -19,7 +19,7 @@ from toolpaths.compiled import chosen, compiled, loop, wanted
 
 FILES = {path.relative_to(ROOT).as_posix(): path for path in product()}
 JIT = "toolpaths/compiled.py"
-WITNESS = "postproc/witness/assign_blocks.py"
+WITNESS = "postproc/witness/loops.py"
 """shares no code with the rest, not even this"""
 AT_ONCE = {
     "machines/geometric_error/actual/actual_chain_loop.py", "machines/geometric_error/actual/rods.py",

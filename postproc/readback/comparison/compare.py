@@ -41,7 +41,7 @@ from postproc.readback.execution.poses import SAMPLES, BlockPoses, arc_sweeps
 from postproc.readback.text.canonical import Canonical
 from postproc.reference.holes import Phase
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Bools, Floats, Ints, as_slice, distinct, shared, without_nan
+from toolpaths.arrays import Bools, Floats, Ints, as_slice, distinct, repeated, shared, without_nan
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, has_errors
 from toolpaths.rotations import angle_between, lengths
@@ -87,6 +87,11 @@ class Comparison:
     """the feeds of the program were planned"""
     lengths: tuple[LengthMargin, ...] = ()
     """how much tools may differ from their gauge lengths, where that is not taken up by a register alone"""
+
+    def without_poses(self) -> Comparison:
+        """The same with NaN in the place of tip and axis."""
+        unknown = repeated(np.full(3, np.nan), len(self.owner))
+        return replace(self, tip=unknown, axis=unknown)
 
 
 def compare(code: Canonical, motion: Motion, job: Job, executed: BlockPoses, gcode: str = "",

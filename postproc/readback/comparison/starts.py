@@ -39,7 +39,7 @@ def check_start(code: Canonical, job: Job, faults: Faults) -> list[Diagnostic]:
         lacks = ", ".join(a for a in lift if a not in here)
         result.append(_error(code, faults, first, f"the first motion leaves {lacks} where it stands, and nobody knows where "
                              "that is", f"lift the tool first: {' '.join(lift)} at home"))
-    down = _comes_down(words, lift, machine, first)
+    down = _comes_down(code, lift, machine, first)
     for a in names if not result else ():
         known = int(_stated(words, (a,), False).min(initial=words.lines + 1))
         if known > down or (known == down and a not in lift):
@@ -49,10 +49,12 @@ def check_start(code: Canonical, job: Job, faults: Faults) -> list[Diagnostic]:
     return result
 
 
-def _comes_down(words: Words, lift: list[str], machine: Ints, first: int) -> int:
-    """The first block behind `first` that moves a lifting axis in work coordinates, or puts a law in force."""
+def _comes_down(code: Canonical, lift: list[str], machine: Ints, first: int) -> int:
+    """The first block behind `first` that moves a lifting axis in work coordinates, or switches a mode on."""
+    words = code.words
     blocks = _stated(words, tuple(lift), True)
-    laws = words.pick(LAW)[0]
+    at, law = words.pick(LAW)
+    laws = at[np.array([one.name != "axes" for one in code.laws] + [False])[law.astype(np.int64)]]
     both = np.concatenate([blocks[~np.isin(blocks, machine)], laws])
     return int(both[both > first].min(initial=words.lines + 1))
 

@@ -64,6 +64,7 @@ class Reader(ABC):
         units_stay: that is a setting of the control, which no program changes
         stating: by group, the words that state it; a block that relies on one that nothing states is an error in `verify`
         leaving: by law, the codes that switch it off; modes_named: what the control calls it
+        home_in_planes: machine coordinates are what they say in a tilted plane that the program before has left on too
         lost_by: codes of laws with which the work offset may be lost: it is stated again before the next move in it
         stop: what M0 and M1 switch off, by the controller file or by that of the machine (`[control] stop`)
         changes: what a tool change switches off
@@ -78,6 +79,7 @@ class Reader(ABC):
     language: MacroLanguage | Literal[""] = ""
     rises_first = False
     turn_codes = False
+    home_in_planes = False
     arc_slack = float("inf")
     sides: ClassVar[dict[int, str]] = {40: "off (G40)", 41: "left (G41)", 42: "right (G42)"}
     alone = "{}"

@@ -54,6 +54,7 @@ class FanucReader(IsoReader):
     letters = "GMFSTHDNIJKRPQLO"
     language: MacroLanguage | Literal[""] = "fanuc"
     rises_first = False
+    home_in_planes = True
     stating = Reader.stating
     leaving: ClassVar[dict[InterpolationMode, tuple[str, ...]]] = {"tilted": ("G69",)}
     laws: ClassVar[tuple[float, ...]] = _LAWS

@@ -110,7 +110,8 @@ def run(code: Canonical, letters: tuple[str, ...], offsets: Offsets,
     found += refused_curves(section, modal.inverse, modal.compensation != 40, linear, code.line, file)
     parts, used, position = [], [AXES], offsets.home
     begun = set(words.pick(LAW)[0].tolist())
-    for first, last, law, register in _stretches(words, modal, code.laws, bool(offsets.others)):
+    home = _out_of_planes(words, modal, code.laws, section) if offsets.home_in_planes else np.zeros(0, dtype=np.int64)
+    for first, last, law, register in _stretches(words, modal, code.laws, bool(offsets.others), home):
         frame = AXES
         if law is not None:
             where, control = (file, int(code.line[first])), offsets.control_at(float(modal.offset[first]))
@@ -126,20 +127,33 @@ def run(code: Canonical, letters: tuple[str, ...], offsets: Offsets,
 
 
 def _stretches(words: Words, modal: Modal, laws: tuple[WordMeaning, ...],
-               places: bool) -> list[tuple[int, int, WordMeaning | None, int]]:
-    """(first, one past the last block, law, length register) of stretches under one law, at one of several `places`."""
+               places: bool, home: Ints) -> list[tuple[int, int, WordMeaning | None, int]]:
+    """(first, one past the last block, law, length register) of stretches under one law, at one of several `places`; blocks
+    `home` are under none."""
     n = words.lines
     law = fill(*words.pick(LAW), n, -1.0).astype(np.int64)
     own = np.array([one.name != "axes" for one in laws] + [False])[law]
+    own[home] = False
     change = np.zeros(n + 1, dtype=bool)
     change[words.pick(LAW)[0]] = True
-    change[1:] |= own[1:] & (np.diff(modal.length_register) != 0)
+    change[1:] |= (own[1:] & (np.diff(modal.length_register) != 0)) | (own[1:] != own[:-1])
     if places:
         change[1:] |= own[1:] & (modal.offset[1:] != modal.offset[:-1])
     change[0] = False
     edges = [1, *np.flatnonzero(change).tolist(), n + 1]
     return [(a, b, laws[law[a]] if law[a] >= 0 and own[a] else None, int(modal.length_register[a]))
             for a, b in pairwise(edges) if b > a]
+
+
+def _out_of_planes(words: Words, modal: Modal, laws: tuple[WordMeaning, ...], section: BlockSection) -> Ints:
+    """Blocks in machine coordinates in which the tool leaves a tilted plane, which is switched off before it moves again."""
+    at, law = words.pick(LAW)
+    names = np.array([one.name for one in laws] + ["axes"])
+    machine = np.flatnonzero(modal.machine & (names[fill(at, law, words.lines, -1.0).astype(np.int64)] == "tilted"))
+    others = np.flatnonzero(section.stated.any(axis=1) & ~modal.machine)
+    off = np.append(names[law.astype(np.int64)] == "axes", False)[np.searchsorted(at, machine, side="right")]
+    stop = np.append(at, 0)[np.searchsorted(at, machine, side="right")]
+    return np.asarray(machine[off & (np.searchsorted(others, machine) == np.searchsorted(others, stop))])
 
 
 def _blocks(words: Words, modal: Modal, letters: tuple[str, ...], offsets: Offsets) -> BlockSection:

@@ -39,6 +39,8 @@ class Offsets:
     """(tool, mm that its radius register holds) where the words are a contour offset back from the tool's centre"""
     corners: OutsideCorners = ""
     """how the control goes round outside corners of such a contour"""
+    home_in_planes: bool = False
+    """machine coordinates are what they say in a block that leaves a tilted plane"""
 
     @property
     def lengths_at(self) -> Ints:

@@ -32,7 +32,7 @@ OTHERS = {"kinematics.rapids", "kinematics.blends_unstated", "kinematics.exact_p
                                         "mixed_head", "mixed_closing_table", "mixed_closing_head", "closing_table",
                                         "closing_head")),
           "kinematics.smoothing_fixed", "kinematics.axis_smoothing_share", "tools.preload",
-          "tools.length_automatic", "tools.cutting_edges", "program.operation",
+          "tools.length_automatic", "tools.length_alone", "tools.cutting_edges", "program.operation",
           "program.carried_out", "program.suffix",
           "splines.word", "splines.decimals", "splines.control_points", "splines.interval", "splines.relies_on",
           "program.relies_on_turns", "program.stock",

@@ -31,7 +31,8 @@ KEYS = [
     ("siemens-840d", "modes.tcp.cycles", "true", "top holes"), ("fanuc-30i", "modes.tilted.angles", '"XYZ"', "auto"),
     ("fanuc-30i", "modes.tilted.decimals", "0", "nutating"), ("fanuc-30i", "modes.tilted.tables_only", "true", "head"),
     ("fanuc-30i", "modes.tcp.length", '"on"', "auto"), ("fanuc-30i", "modes.tilted.length", '"any"', "auto"),
-    ("fanuc-30i", "modes.tilted.start", "[]", "auto"), ("fanuc-30i", "modes.tcp.relies_on", '["a licence"]', "auto"),
+    ("haas-ngc", "modes.tilted.start", "[]", "auto"), ("fanuc-30i", "modes.tcp.relies_on", '["a licence"]', "auto"),
+    ("fanuc-30i", "modes.tilted.lifted", "[]", "auto"), ("fanuc-30i", "tools.length_alone", '"a setting"', "tcp"),
     ("siemens-840d", "tools.home_without_length", "false", "auto"), ("fanuc-30i", "tools.length_with_z", "false", "axes"),
     ("haas-ngc", "cycles.dwell_milliseconds", "false", "axes"), ("heidenhain-tnc640", "format.plus_sign", "false", "axes"),
     ("heidenhain-tnc640", "program.work_offsets.G54", '"CYCL DEF 247 DATUM SETTING ~\\nQ339=+9 ;DATUM NUMBER"', "axes")]

@@ -12,6 +12,8 @@ import pytest
 
 from postproc.control.modes import table_axes
 from postproc.controllers.model import builtin_files
+from postproc.readback.comparison.unstated_codes import changed_alone
+from postproc.readback.dialects.readers import reader_for
 from postproc.readback.text.words import plain
 from postproc.setup.model import SetupFile
 from postproc.verification.read_back import read_back
@@ -151,6 +153,21 @@ def test_machine_coordinates_are_for_one_block(dialect: str, up: str, above: str
     call = "TOOL CALL 3 Z S500\n" if dialect == TNC else ""
     motion = good(dialect, program(dialect, f"{call}{up}\n{above}\n{low}"))
     assert motion.end[0, 2] == 300.0 and motion.end[-1].tolist() == [11.0, 20.0, 39.0]
+
+
+@pytest.mark.parametrize(("body", "lines"), [
+    ("G53 G0 Z0.\nG49\nG0 X1.\nG43 H1 Z9.\n", []), ("G0 G43 H1 Z9.\nX1.\nG49 Z9.\n", []),
+    ("G0 G43 H1\nZ9.\nX1.\nG49\n", [5, 8]), ("G0 G43 H1 Z9.\nG49\nG53 G0 Z0.\n", [6]),
+    ("G0 G43 H1 Z9.\nG53 G0 Z0.\nM5\nG49\n", []), ("G0 G43 H1 Z9.\nG53 G0 X0.\nG49\n", [7]),
+    ("G0 G43 H1 Z9.\nG53 G0 G49 Z0.\nG43 H0\nG43 H2 X1.\n", [8]), ("G0 G43 H1 Z9.\nG43 H1\nG43 H2\n", [7]),
+    ("G0 G43 H1 Z9.\nG91 G28 Z0.\nG49\nG90\n", [])])
+def test_lengths_that_change_in_blocks_of_their_own(body: str, lines: list[int]) -> None:
+    """B-63943EN-1 12.5.2: G43 and G49 without a move move nothing with 5006#6 TOS = 1, else by the length; F5 14.1.2: a move
+    of Z by G53 or G28 ends the length. The head has G49 in line 3, before which nobody knows what is in force."""
+    held = spec(FANUC)
+    code, found = reader_for(held, ("X", "Y", "Z"), np.array([0.0, 0.0, 400.0])).read(program(FANUC, body).encode(), "MAIN")
+    assert code is not None and not found and held.tools.length_alone
+    assert [code.line[blocks].tolist() for blocks in changed_alone(code)] == [lines, [3]]
 
 
 def test_rigid_taps_on_fanuc_need_m29() -> None:

@@ -344,8 +344,15 @@ def test_answers_are_numbers_within_limits() -> None:
     speed, feed, coolant = questions_of(facts_of(path, machine("mill-3axis"), spec, Options()))
     assert parsed(speed, "8000,5") == (8000.5, "") and parsed(feed, "")[1] == "a value is needed"
     assert parsed(speed, "inf")[0] is None and parsed(speed, "nan")[0] is None and parsed(feed, "0")[0] is None
+    assert parsed(feed, "600 mm/min") == parsed(feed, "600") == (600.0, "") and parsed(feed, "20 ipm") == (508.0, "")
     assert parsed(coolant, "") == ("off", "") and parsed(coolant, "Mist") == ("mist", "")
     assert parsed(coolant, "oil")[0] is None
+
+
+def test_a_length_may_come_with_its_unit() -> None:
+    length = Question("gauge_length", 1, "T1: gauge length", None, 100.0)
+    assert parsed(length, '4.5 in') == parsed(length, '4.5"') == (pytest.approx(114.3), "")
+    assert parsed(length, "120 mm") == parsed(length, "120") == (120.0, "") and parsed(length, "120 kg")[0] is None
 
 
 def test_the_largest_speed_of_the_machine_is_asked_and_taken_at_most() -> None:

@@ -104,8 +104,8 @@ def test_taps_that_lose_what_couples_them_are_refused() -> None:
     assert "gcode.cycle" in codes(found(part("heidenhain-tnc640"), "CYCL DEF 207", "CYCL DEF 206"))
 
 
-CHANGES = {"linuxcnc": ("G53 G0 Z400\n", "M5\n", "M9\n"), "fanuc-30i": ("G53 G0 Z400.\n", "M5\n", "M9\n"),
-           "haas-ngc": ("G53 G0 Z400.\n", "M5\n", "M9\n"), "siemens-840d": ("SUPA G0 D0 Z400\n", "M5\n", "M9\n"),
+CHANGES = {"linuxcnc": ("G53 G0 Z400\n", "M5\n", "M9\n"), "fanuc-30i": ("G53 G0 G49 Z400.\n", "M5\n", "M9\n"),
+           "haas-ngc": ("G53 G0 G49 Z400.\n", "M5\n", "M9\n"), "siemens-840d": ("SUPA G0 D0 Z400\n", "M5\n", "M9\n"),
            "heidenhain-tnc640": ("L Z+400 FMAX M91\n", "M5\n", "M9\n")}
 
 
@@ -115,6 +115,20 @@ def test_tools_change_at_home_with_spindle_and_coolant_off(controller: str) -> N
     for old, at, what in ((home, 1, "away from home"), (stop, 0, "spindle turns"), (dry, 0, "coolant flows")):
         noted = [d for d in found(part(controller), old, "\n", at) if d.severity is Severity.ERROR]
         assert noted and noted[0].code == "verify.tool_change" and what in noted[0].message
+
+
+@pytest.mark.parametrize(("at", "severity"), [(0, Severity.WARNING), (1, Severity.ERROR)])
+@pytest.mark.parametrize("controller", ["fanuc-30i", "generic-iso"])
+def test_a_length_cancelled_before_home_asks_for_the_setting(controller: str, at: int, severity: Severity) -> None:
+    """The block that goes home before a tool change cancels the length (at 0 nobody knows whether one is in force); before
+    it the tool may move down by the length. The machine file, or the header of the program, may say that it does not."""
+    result, home = part(controller), "G53 G0 G49 Z400.\n"
+    noted = [d for d in found(result, home, "G49\nG53 G0 Z400.\n", at) if d.code == "verify.length_alone"]
+    setting = result.controller.tools.length_alone
+    assert [(d.severity, setting in d.message) for d in noted] == [(severity, True)] and ("5006#6" in setting) == (
+        controller == "fanuc-30i")
+    said = replace(result, text=re.sub(r"(?i)\n\(source", f"\n(NEEDS {setting.upper()})\\g<0>", result.text, count=1))
+    assert not [d for d in found(said, home, "G49\nG53 G0 Z400.\n", at) if d.code == "verify.length_alone"]
 
 
 @pytest.mark.parametrize("controller", ["fanuc-30i", "siemens-840d", "heidenhain-tnc640", "haas-ngc"])

@@ -63,7 +63,8 @@ def executed(result: PostResult, text: str, start: np.ndarray) -> Motion:
     assert code is not None and not has_errors(found), [str(d) for d in found]
     motion, found = run(code, job.machine.axis_names,
                         Offsets(control.work_offset, control.xyz, job.register_lengths(), start, control.length_on_z,
-                                job.controller.cycles.peck_relief, control, reader.rises_first, reader.arc_slack), "MAIN")
+                                job.controller.cycles.peck_relief, control, reader.rises_first, reader.arc_slack,
+                                home_in_planes=reader.home_in_planes), "MAIN")
     assert not has_errors(found), [str(d) for d in found]
     return motion
 

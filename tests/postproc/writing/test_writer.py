@@ -196,7 +196,7 @@ def test_ends_of_every_program() -> None:
         lines = sample(file, name, controller).text.splitlines()
         assert (lines[0], lines[-1]) == ("%", "%")
         assert lines[-2] == ("M2" if controller == "linuxcnc" else "M30")
-        start = "G21 G90 G91.1 G94 G17 G40 G49 G80" if controller == "linuxcnc" else "G21 G90 G94 G17 G40 G49 G80"
+        start = "G21 G90 G91.1 G94 G17 G40 G49 G80" if controller == "linuxcnc" else "G21 G90 G94 G17 G40 G80"
         assert lines.index(start) < lines.index("G54") < next(i for i, n in enumerate(lines) if "M6" in n)
         assert sum("G21" in n for n in lines) == 1
 

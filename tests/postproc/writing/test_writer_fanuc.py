@@ -80,13 +80,13 @@ def test_tcp_on_heads_takes_the_register_that_axis_positions_do_not() -> None:
 def test_safe_start_ends_a_plane_only_in_programs_with_planes() -> None:
     plain = lines("fanuc-30i", program([step("rapid", X=0.0)]))
     tilted = lines("fanuc-30i", program([step("rapid", X=0.0)], sections=(Section(0, "axes"), TILTED)))
-    assert "G69" not in plain and "G49" in tilted[tilted.index("G69") + 1]
+    assert "G69" not in plain and tilted[tilted.index("G69") - 1] == "G49" and "G17 G21 G40 G80 G90 G94 G98" in tilted
 
 
 def test_the_head_names_the_parameters_that_a_mode_needs() -> None:
     text = lines("fanuc-30i", program([step("rapid", X=0.0)], sections=(Section(0, "axes"), TILTED, TCP)))
     needed = [line for line in text if line.startswith("(NEEDS ")]
-    assert [key in line for key, line in zip(("G43.4", "5006#6", "19696#5", "ROTARY VALUES OF 0", "G68.2",
+    assert [key in line for key, line in zip(("G43.4", "19696#5", "ROTARY VALUES OF 0", "G68.2", "5006#6",
                                                       "G05.1"), needed, strict=True)] == [True] * 6
     assert [line for line in lines("fanuc-30i", program([step("rapid", X=0.0)])) if "NEEDS" in line] == needed[-1:]
 
