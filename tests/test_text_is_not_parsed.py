@@ -39,6 +39,7 @@ FILES = {
     "postproc.readback.comparison.slow_moves": "F words of programs",
     "postproc.readback.comparison.stock": "stock stated in programs",
     "postproc.readback.comparison.unstated_codes": "codes of programs",
+    "postproc.verification.asked_output": "calls of subprograms, names of programs",
     "postproc.verification.stated_numbers": "numbers in the header of a program",
     "postproc.verification.tool_table_file": "tool tables of controls",
     "postproc.writing.linuxcnc": "comments that LinuxCNC obeys", "postproc.writing.state": "decimals of words",

@@ -29,8 +29,11 @@ GENTLE = 0.95
 GENTLER, LAST, AGAIN = (0.94, 0.93, 0.92, 0.9), 30, 160
 """other such shares; cycles before a rest in which a motion that speeds up again has slowed down too early, and from which
 it is tried again"""
-NEAR, LEAST = 2, 0.8
-"""cycles around such a place that become slower, and the share of the speed that is left at least each time"""
+NEAR = 2
+"""cycles around such a place that become slower"""
+SPIKE, LESS = 2.0, 0.95
+"""a jerk that is exceeded more than that is no bend: the motion came upon its braking curve too late, and comes upon it
+otherwise by a little less speed"""
 
 
 @dataclass(frozen=True)
@@ -212,7 +215,8 @@ def _slower(part: Allowed, moved: Floats, used: Floats) -> Floats:
     for i in np.flatnonzero(used > USED).tolist():
         low, high = np.searchsorted(part.s, s[[max(i - NEAR, 0), min(i + NEAR, len(s) - 1)]]).tolist()
         rows = slice(low, high + 1)
-        cap[rows] = np.minimum(cap[rows], max(moved[i, 1] * max(used[i] ** (-1.0 / 3.0), LEAST), SLOWEST))
+        less = used[i] ** (-1.0 / 3.0) if used[i] < SPIKE else LESS
+        cap[rows] = np.minimum(cap[rows], max(moved[i, 1] * less, SLOWEST))
     return cap
 
 

@@ -14,8 +14,8 @@ from functools import cached_property
 
 import numpy as np
 
+from postproc.clock.curve import curve
 from postproc.clock.kernels import add_turns
-from postproc.clock.tangents import tangents
 from postproc.feedrate.paths import Derivatives
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.compiled import chosen
@@ -28,11 +28,11 @@ a curve"""
 EVEN, SLIGHT, ROUNDED = 1.5, 0.02, 0.003
 """on a curve a vertex turns at most EVEN times what both neighbours turn together, or SLIGHT rad, or what points rounded to
 0.001 mm may turn: ROUNDED mm over the shorter chord"""
-FEW_TURN, FEW_EVEN, FEW_SUM = 1.85, 6.0, 2.6
+FEW_TURN, FEW_EVEN, FEW_SUM = 1.95, 8.0, 2.6
 """a bend that few points show: what one vertex turns at most (2 sin of half the angle), how many times what both neighbours
 turn to the same side, and all three together (those of a square turn by 4.2: corners)"""
-BY_CHORD = 0.5
-"""power of the chord by which splines are parametrised: centripetal (E. T. Y. Lee, Computer-Aided Design 21, 1989)"""
+LEFT = 0.3
+"""of the tolerance, that is left for smoothing at least where points have moved"""
 PIECE_TURN, MOST_PIECES = 0.005, 96
 """rad that a fitted curve turns from piece to piece, and pieces of a block at most"""
 WIDTHS = 0.01 * 1.3 ** np.arange(30)
@@ -188,28 +188,29 @@ def _blended(path: CommandedPath) -> BlendedPath:
 
 def fitted(path: CommandedPath) -> tuple[Floats, Floats, Floats, Ints]:
     """(points (P + 1, A), length (P,) in mm, tolerance (P + 1,), block of each piece (P,)): blocks on one curve as pieces
-    of a cubic spline through their ends."""
+    of the smoothest that the tolerance allows (`curve.py`)."""
     flat = path.points * path.weight
     step = np.diff(flat, axis=0)
     chord = np.maximum(np.linalg.norm(step, axis=1), 1e-12)
     u = step / chord[:, None]
-    smooth, turn = _curved(u, chord, path)
-    along = chord**BY_CHORD
-    first, last = tangents(u, chord, along, smooth)
-    bend = np.maximum(np.concatenate([[0.0], np.where(smooth, turn, 0.0)]), np.append(np.where(smooth, turn, 0.0), 0.0))
-    count = np.clip(np.ceil(bend / PIECE_TURN), 1, MOST_PIECES).astype(np.int64)
-    owner = np.repeat(np.arange(len(u)), count)
-    part = (np.arange(len(owner)) - (np.cumsum(count) - count)[owner] + 1.0) / count[owner]
-    x = part[:, None]
-    h = along[owner, None]
-    inner = (flat[owner] * (1 + 2 * x) * (1 - x) ** 2 + flat[owner + 1] * x**2 * (3 - 2 * x)
-             + h * first[owner] * x * (1 - x) ** 2 + h * last[owner] * x**2 * (x - 1))
-    inner[part >= 1.0 - 1e-12] = flat[1:]
-    wide = np.concatenate([flat[:1], inner])
+    smooth, _ = _curved(u, chord, path)
+    laid = curve(flat, u, chord, smooth, path.tolerance)
+    count = np.clip(np.ceil(laid.bends() / PIECE_TURN), 1, MOST_PIECES).astype(np.int64)
+    piece = np.repeat(np.arange(len(count)), count)
+    part = (np.arange(len(piece)) - (np.cumsum(count) - count)[piece] + 1.0) / count[piece]
+    x, h = part[:, None], laid.along[piece, None]
+    inner = (laid.points[piece] * (1 + 2 * x) * (1 - x) ** 2 + laid.points[piece + 1] * x**2 * (3 - 2 * x)
+             + h * laid.first[piece] * x * (1 - x) ** 2 + h * laid.last[piece] * x**2 * (x - 1))
+    last = np.cumsum(count) - 1
+    inner[last] = laid.points[1:]
+    wide = np.concatenate([laid.points[:1], inner])
     length = np.maximum(np.linalg.norm(np.diff(wide, axis=0), axis=1), 1e-12)
-    tolerance = np.maximum(path.tolerance[owner], path.tolerance[owner + 1])
-    tolerance = np.where(part >= 1.0 - 1e-12, path.tolerance[owner + 1], tolerance)
-    return wide / path.weight, length, np.concatenate([path.tolerance[:1], tolerance]), owner
+    owner, ends = laid.owner[piece], last[laid.ends]
+    moved = np.linalg.norm(wide[np.concatenate([[0], ends + 1])] - flat, axis=1)
+    left = np.maximum(path.tolerance - moved, LEFT * path.tolerance)
+    tolerance = np.maximum(left[owner], left[owner + 1])
+    tolerance[ends] = left[1:]
+    return wide / path.weight, length, np.concatenate([left[:1], tolerance]), owner
 
 
 def sharp(path: CommandedPath) -> CommandedPath:

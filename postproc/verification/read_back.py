@@ -33,6 +33,7 @@ from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
 from postproc.readback.execution.poses import BlockPoses
 from postproc.readback.text.canonical import placed
+from postproc.verification.asked_output import check_asked
 from postproc.verification.executed import executed_poses
 from postproc.verification.length_limits import LengthTrial, length_margins
 from toolpaths.arrays import Floats
@@ -93,8 +94,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     machine, control = job.machine, job.control
     home = control.words(machine.home[None, :], machine.kinematics, 0.0)[0] + control.work_offset
     reader = reader_for(job.controller, machine.axis_names, home, machine.stop, control.rolls, machine.clamp_codes)
-    _give(reader, job)
-    code, diagnostics = reader.read(data, gcode, others)
+    code, diagnostics = _given(reader, job).read(data, gcode, others)
     header = read_header(as_bytes(data[:HEADER]))
     diagnostics = [_located(_judged(d, reader.units_stay), job.toolpath.file, of_cl) for d in diagnostics]
     if gcode and not job.corrects and header.corrected is not None:
@@ -126,10 +126,11 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
                *check_stops(code, motion, job, faults), *check_clamps(whole, motion, job, comparison.owner, faults),
                *check_length_alone(data, whole, job, gcode), *check_options(code, motion, job, faults),
+               *check_index(motion, job, home, comparison.owner, faults), *check_stock(data, job, faults),
                *check_safe_planes(motion, executed, job, home, comparison.owner, faults),
-               *check_index(motion, job, home, comparison.owner, faults),
                *check_hooks(data, code, motion, job, comparison.owner, faults),
-               *check_stock(data, job, faults), *_bodies(motion, executed, job, comparison, faults)]
+               *check_asked(data, whole, motion, job, reader, comparison.owner, home, faults),
+               *_bodies(motion, executed, job, comparison, faults)]
     noted = sorted([*unseen, *comparison.diagnostics], key=lambda d: d.code not in CAUSES)
     if gcode and job.corrects and job.errors is not None:
         noted = [*(_of_model(header, job.errors, gcode, has_errors(noted)) if header.corrected is not None else
@@ -149,11 +150,12 @@ def _offsets(job: Job, reader: Reader, home: Floats) -> Offsets:
                    _others(job, reader), radii, job.controller.cutter_compensation.corners, reader.home_in_planes)
 
 
-def _give(reader: Reader, job: Job) -> None:
-    """What the control holds by the set-up, for programs that ask for it."""
+def _given(reader: Reader, job: Job) -> Reader:
+    """The reader with what the control holds by the set-up, for programs that ask for it."""
     held = dict(_others(job, reader))
     reader.given(lambda register: held.get(register, job.control).work_offset, job.register_lengths(),
                  frozenset(registers_of(job, reader)))
+    return reader
 
 
 def _others(job: Job, reader: Reader) -> tuple[tuple[float, Control], ...]:

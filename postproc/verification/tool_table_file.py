@@ -34,6 +34,7 @@ _HINT = "name the file that the control writes of its tool table, or one of text
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)")
 _WORD = re.compile(r"\s*([A-DF-Z])\s*([+-]?(?:\d+\.?\d*|\.\d+))(?=[\sA-Z]|$)", re.IGNORECASE)
 _HAAS_TOOL = re.compile(r"<TOOL(\d+)>(.*?)</TOOL\1>", re.IGNORECASE | re.DOTALL)
+_HAAS_TAG = re.compile(r"<TOOL(?:_OFFSET|\d+)\b", re.IGNORECASE)
 _HAAS_LENGTH = re.compile(r"<LENGTH_(GEOMETRY|WEAR)>([^<]*)</LENGTH_\1>", re.IGNORECASE)
 _SIEMENS = re.compile(r"\$TC_DP(3|12|21)\s*\[\s*(\d+)\s*,\s*1\s*\]\s*=\s*([^\s;$]*)", re.IGNORECASE)
 _ASIDE_OF_SIEMENS = re.compile(r"(\$TC_DP(?:4|5|13|14|22|23))\s*\[\s*(\d+)\s*,\s*1\s*\]\s*=\s*([^\s;$]*)", re.IGNORECASE)
@@ -175,7 +176,7 @@ def _linuxcnc(lines: list[str], rows: _Rows) -> None:
 def _offsets(lines: list[str], rows: _Rows) -> None:
     unit = 1.0
     for n, line in enumerate(lines, 1):
-        block = re.sub(r"\([^)]*\)", "", line).strip()
+        block = re.sub(r"\([^)]*\)", "", line).strip().removesuffix(";")  # as the screen shows the end of a block
         if not re.search(r"G\s*(10|20|21|91)(?!\d)", block, re.IGNORECASE):
             continue
         words = _words(block, n, rows)
@@ -187,7 +188,7 @@ def _offsets(lines: list[str], rows: _Rows) -> None:
         kinds = [value for letter, value in words if letter == "L"]
         if 10.0 not in codes or not set(kinds) & {1.0, 10.0, 11.0}:
             continue
-        if "." not in block.upper().rpartition("R")[2]:
+        if "." not in block.upper().rpartition("R")[2] and ("R", 0.0) not in words:
             rows.fault("point", f"{block[:40]!r}: R has no decimal point, it may be mm or increments", n,
                        "write R with a decimal point: R120. is 120 mm")
         elif values := _single(words, "LPR", n, rows):
@@ -195,7 +196,7 @@ def _offsets(lines: list[str], rows: _Rows) -> None:
 
 
 def _haas(lines: list[str], rows: _Rows) -> None:
-    if not any("<TOOL_OFFSET" in line.upper() for line in lines):
+    if not any(_HAAS_TAG.search(line) for line in lines):
         _offsets(lines, rows)
         return
     text, parts = "\n".join(lines), dict[str, Part]({"GEOMETRY": "geometry", "WEAR": "wear"})

@@ -26,6 +26,10 @@ def edited(code: str, text: str, old: str, new: str, says: str, *does: Edit, mac
 
 
 _EDITED = [
+    HintCase("verify.asked", f"verify p.nc part.apt {ON}", {"part.apt": START + CUT + "FINI\n", "s.toml": LENGTH},
+             r"take (restart) out of its \[output\]|(convert) again with this set-up",
+             (Edit("s.toml", "[output]\nprogram_number = 77\n", ""),), first=(f"convert part.apt {ON} -o p.nc",),
+             harm=(Edit("s.toml", LENGTH, LENGTH + "[output]\nprogram_number = 77\n"),)),
     edited("verify.end", CUT, "G53 G0 G49 Z400.\nG53 G0 X0. Y0.\n", "", "retract to home before the end is missing",
            Edit("p.nc", "G05.1 Q0\nM9", "G53 G0 G49 Z400.\nG53 G0 X0. Y0.\nG05.1 Q0\nM9")),
     edited("verify.feed", DOWN, "F44122.6982", "F88000.", "the feed of the slowest axis", setup=FED),

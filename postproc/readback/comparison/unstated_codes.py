@@ -31,7 +31,7 @@ Need = tuple[str, Ints, Ints]
 def check_stated(code: Canonical, reader: Reader, file: str) -> list[Diagnostic]:
     """Blocks that rely on a state that nothing before them, and not they themselves, has stated."""
     result = []
-    for what, relying, stating in _needs(code, reader):
+    for what, relying, stating in needs(code, reader):
         first = int(stating.min(initial=code.words.lines + 1))
         bad = distinct(relying[relying < first])
         if len(bad):
@@ -44,7 +44,17 @@ def check_stated(code: Canonical, reader: Reader, file: str) -> list[Diagnostic]
     return result + _undone(code, reader, file) + _lost(code, reader, file)
 
 
-def _needs(code: Canonical, reader: Reader) -> Iterator[Need]:
+def unstated_between(needed: list[Need], first: int, last: int) -> list[str]:
+    """Of what blocks need (`needs`), what those first..last rely on and none of them states before it."""
+    result = []
+    for what, relying, stating in needed:
+        relies = relying[(relying >= first) & (relying <= last)].min(initial=last + 1)
+        if relies <= last and stating[stating >= first].min(initial=last + 1) > relies:
+            result.append(what)
+    return result
+
+
+def needs(code: Canonical, reader: Reader) -> Iterator[Need]:
     """What the dialect has no fixed state for, without what the controller file says of its start."""
     words, known = code.words, _known(reader)
     moves, machine = _moves(words, reader.axes), codes(words, "G", (53,))[0]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from postproc.readback.text.canonical import Files, placed
-from postproc.readback.text.tool_names import called_by_number
+from postproc.readback.text.tool_names import called_otherwise
 from postproc.readback.text.words import lines_of, plain
 from toolpaths.arrays import Ints
 from toolpaths.dataclass import dataclass
@@ -37,7 +37,7 @@ _NEEDED = {
         rb"|\bR\d+[ \t]*=|=[ \t]*[-+]*[ \t]*(?!(?:IC|AC|DC|ACP|ACN)[ \t]*\([ \t]*[-+.\d]+[ \t]*\))[A-Z_$(\[]"
         rb"|=[ \t]*[-+]?[\d.]+[ \t]*[-+*/]|\bT[ \t]*=[ \t]*\"|\bPROC\b[^\n]*(?:\(|\bSAVE\b)"
         rb"|\bMCALL[ \t]+(?!CYCLE8)[A-Z_]"),
-    "klartext": re.compile(rb"DECLARE STRING|TRANS DATUM|CYCL DEF[ \t]*[78]\.|FN[ \t]*\d+[ \t]*:"
+    "klartext": re.compile(rb"DECLARE STRING|TRANS DATUM|CYCL DEF[ \t]*(?:[78]|10)\.|FN[ \t]*\d+[ \t]*:"
                            rb"|(?m:^)[ \t]*(?:\d+[ \t]+)?Q[LRS]?\d+[ \t]*=|Q[LRS]?\d+(?!\d|[ \t]*=)")}
 _SIGNS_OF: dict[MacroLanguage, tuple[bytes, ...]] = {"fanuc": (b"#", b"[", b"GOTO"), "linuxcnc": (b"#", b"[")}
 _BEGINNINGS: dict[MacroLanguage, tuple[re.Pattern[bytes], ...]] = {
@@ -105,7 +105,7 @@ def executed(data: bytes, file: str, others: Mapping[str, bytes], language: Macr
     rows = _rows_of(language)
 
     def cleaned(text: bytes, name: str) -> tuple[list[str], list[Diagnostic]]:
-        text, found = ((text, called_by_number(text, held.tools, name)) if language == "siemens" else
+        text, found = ((text, called_otherwise(text, held.tools, name)) if language == "siemens" else
                        numbered(text, name))
         made, more = rows(text, name)
         return made, [*found, *more]

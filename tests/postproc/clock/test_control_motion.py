@@ -10,7 +10,7 @@ import pytest
 
 from postproc.clock.allowed import block_speeds
 from postproc.clock.control import execute
-from postproc.clock.path import CommandedPath, blended
+from postproc.clock.path import CommandedPath, blended, fitted
 from postproc.clock.settings import STEEPEST, ControlSettings
 from postproc.cycle_time import control
 from postproc.cycle_time.estimate import timed, total
@@ -184,14 +184,47 @@ def test_what_cannot_be_executed_is_said(monkeypatch: pytest.MonkeyPatch) -> Non
     assert [d.code for d in beyond.found] == ["time.control"] and (beyond.seconds == quick).all()
 
 
-@pytest.mark.parametrize(("control", "most", "every"), [
-    (LIMITS, 1.02, 4), (replace(LIMITS, corner_step=np.full(2, 8.333)), 1.04, 19)])
-def test_how_far_points_of_the_measured_curve_stand_apart_changes_its_time_little(control: ControlSettings, most: float,
-                                                                                  every: int) -> None:
+@pytest.mark.parametrize(("tolerance", "step", "most", "every"), [
+    (0.02, None, 1.021, 4), (0.01, None, 1.022, 6), (0.005, None, 1.03, 6), (0.002, None, 1.042, 19),
+    (0.01, 8.333, 1.022, 6)])
+def test_how_far_points_of_the_measured_curve_stand_apart_changes_its_time_little(
+        tolerance: float, step: float | None, most: float, every: int) -> None:
     """0.05 to 1 mm (`published.py` has all 39): bends of 0.04 mm radius, which few points or none show."""
-    times = [execute(commanded(points(chord)), control).seconds for chord in np.linspace(0.05, 1.0, 39)[::every]]
+    control = LIMITS if step is None else replace(LIMITS, corner_step=np.full(2, step))
+    times = [execute(commanded(points(chord), tolerance), control).seconds for chord in np.linspace(0.05, 1.0, 39)[::every]]
     assert max(times) <= most * min(times)
     assert times == pytest.approx([MEASURED] * len(times), rel=0.05)
+
+
+def swivelling(chord: float, tolerance: float) -> CommandedPath:
+    """Five axes along a wave, points rounded as a program's; the feed is that of the tip."""
+    u = np.linspace(0.0, 1.0, round(40.0 / chord) + 1)
+    tip = np.stack([40.0 * u, 4.0 * np.sin(8.0 * u), 2.0 * np.cos(6.0 * u)], axis=1)
+    a, c = 0.35 + 0.2 * np.sin(10.0 * u), 1.2 * np.sin(5.0 * u + 0.4)
+    arm = 60.0 * np.stack([np.sin(a) * np.sin(c), -np.sin(a) * np.cos(c), np.cos(a)], axis=1)
+    q = np.column_stack([(tip + arm).round(3), np.radians(np.degrees([a, c]).round(3)).T])
+    path = commanded(q, tolerance)
+    return replace(path, length=np.linalg.norm(np.diff(tip, axis=0), axis=1), weight=np.array([1.0, 1.0, 1.0, 50.0, 50.0]))
+
+
+@pytest.mark.parametrize(("tolerance", "most"), [(0.02, 1.02), (0.005, 1.026)])
+def test_how_far_points_stand_apart_changes_the_time_of_five_axes_little(tolerance: float, most: float) -> None:
+    limits = ControlSettings(np.array([500.0] * 3 + [1.57, 2.09]), np.array([2500.0, 3000.0, 2100.0, 5.2, 5.2]),
+                             np.array([5000.0] * 3 + [50.0] * 2))
+    times = [execute(swivelling(chord, tolerance), limits).seconds for chord in (0.1, 0.2, 0.45, 1.0)]
+    assert max(times) <= most * min(times)
+
+
+@pytest.mark.parametrize("chord", [0.05, 0.3, 0.95])
+def test_a_curve_passes_its_points_within_their_tolerance_and_bends_as_little_as_its_points_do(chord: float) -> None:
+    """Points rounded to 0.001 mm; a corner, before it a straight line, which stays one."""
+    q = np.concatenate([[[-20.0, 9.0], [-10.0, 9.0], [-10.0, 0.0], [-1.0, 0.0]], points(chord) - points(chord)[0]])
+    made, length, _, owner = fitted(commanded(q, 0.004))
+    at = np.concatenate([[0], np.flatnonzero(np.diff(owner)) + 1, [len(owner)]])
+    off = np.linalg.norm(made[at] - q, axis=1)
+    assert off.max() <= 0.004 and off[:4].max() <= 1e-6
+    assert (np.count_nonzero(owner[:, None] == np.arange(2), axis=0) == 1).all()
+    assert length.sum() == pytest.approx(np.linalg.norm(np.diff(q, axis=0), axis=1).sum(), rel=0.02)
 
 
 def test_no_motion_creeps_before_it_rests() -> None:

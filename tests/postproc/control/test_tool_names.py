@@ -63,6 +63,25 @@ def test_a_number_in_the_place_of_a_name_is_refused(controller: str) -> None:
     assert all(re.search(r"\bT2$|TOOL (CALL|DEF) 2\b", text.splitlines()[n - 1]) for n in line)
 
 
+@pytest.mark.parametrize(("controller", "before", "call", "said"), [
+    ("siemens-840d", "R10=1", "T=R10", "the number in R10"), ("siemens-840d", "DEF STRING[16] NM, OT", "T=NM", ""),
+    ("heidenhain-tnc640", "Q1 = 1", "TOOL CALL Q1", "the number in Q1"),
+    ("heidenhain-tnc640", 'QS1 = "EM10_ROUGH"', "TOOL CALL QS1", "")])
+def test_a_tool_called_by_a_variable_with_a_number_is_refused(controller: str, before: str, call: str, said: str) -> None:
+    """A variable that holds the name is as good as the name."""
+    result = good(called(controller))
+    assert result.job is not None
+    before += '\nNM="EM10_ROUGH"' * ("STRING" in before)
+    old = 'T="EM10_ROUGH"' if controller == "siemens-840d" else 'TOOL CALL "EM10_ROUGH"'
+    rows = result.text.splitlines()
+    at = next(k for k, row in enumerate(rows) if old in row)
+    rows[at:at + 1] = [*before.splitlines(), rows[at].replace(old, call)]
+    found = [d for d in read_back("\n".join(rows).encode(), result.job, "test.apt", gcode="p.nc")[1]
+             if d.severity is not Severity.INFO]
+    assert [d.message for d in found if said and said in d.message] == [d.message for d in found]
+    assert bool(found) == bool(said) and all(call in rows[d.lines[0] - 1] for d in found)
+
+
 def test_a_program_by_names_needs_the_set_up() -> None:
     named, bare = good(called("siemens-840d", "EM10_ROUGH", "BM6")), good(called("siemens-840d", ""))
     assert bare.job is not None

@@ -11,6 +11,7 @@ from tests.postproc.reader_kit import FANUC, HAAS, SIEMENS, TNC, executed, fault
 LINUXCNC = "linuxcnc"
 HEAD = "%\nO0001\nG17 G21 G40 G49 G80 G90 G94 G98\nG54\nG0 X0. Y0. Z0.\n"
 SINUMERIK = "G17 G40 G90 G94 G54 G71\nG0 X0 Y0 Z0\n"
+ROTATION = "CYCL DEF 10.0 ROTATION\nCYCL DEF 10.1 "
 MIRROR = "CYCL DEF 8.0 MIRROR IMAGE\nCYCL DEF 8.1 "
 DRILL = ("CYCL DEF 200 DRILLING Q200=+2 Q201=-20 Q206=+100 Q202=+5 Q210=+0 Q203=+0 Q204=+10 Q211=+0\n")
 
@@ -102,8 +103,27 @@ def test_a_mirror_image_of_klartext_is_the_same_program_written_out() -> None:
         np.testing.assert_allclose(words(one), words(other), atol=1e-9)
 
 
+def test_a_rotation_of_klartext_is_the_same_program_written_out() -> None:
+    """About the datum in force, also of axes that a block leaves out, of poles and of increments; ends of circles alike."""
+    for body, plain in (
+            (f"TRANS DATUM AXIS X+10\n{ROTATION}ROT+90\nL X+5 Y+3 F100\nL Z-2\nL X+7\nL IY+2\nCC X+0 Y+5\nC X-7 Y+5 DR-\n"
+             f"{ROTATION}ROT+0\nL X+1\n",
+             "L X+7 Y+5 F100\nL Z-2\nL X+7 Y+7\nL X+5 Y+7\nCC X+5 Y+0\nC X+5 Y-7 DR-\nL X+11\n"),
+            (f"{ROTATION}ROT+60\n{ROTATION}IROT+30\nL Y+1 X+2 R0 FMAX\nCR X+4 Y+1 R+1 DR+ F100\n",
+             "L X-1 Y+2 R0 FMAX\nCR X-1 Y+4 R+1 DR+ F100\n")):
+        one, other = (good(TNC, f"BEGIN PGM A MM\nL X+0 Y+0 Z+0 R0 FMAX\n{text}L M30\nEND PGM A MM\n")
+                      for text in (body, plain))
+        assert (one.ccw == other.ccw).all() and (one.code == other.code).all()
+        np.testing.assert_allclose(words(one), words(other), atol=1e-9)
+
+
 @pytest.mark.parametrize(("control", "text"), [
-    (TNC, MIRROR + "Z\n"), (TNC, MIRROR + "X\nLP PR+10 PA+0 FMAX\n"), (TNC, MIRROR + "X\nTRANS DATUM AXIS X+1\n"),
+    (TNC, ROTATION + "ROT+9\nL X+1 FMAX\n"), (TNC, ROTATION + "ROT+9\nL X+1 Y+1 FMAX\nCC X+1\nC X+2 Y+1 DR+ F9\n"),
+    (TNC, ROTATION + "ROT+9\nTRANS DATUM AXIS X+1\n"), (TNC, ROTATION + "ROT+9\nTRANS DATUM RESET\n"),
+    (TNC, "CC X+1 Y+1\n" + ROTATION + "ROT+9\nL X+1 Y+1 FMAX\nC X+1 Y+1 DR+ F9\n"),
+    (TNC, ROTATION + "ROT+9\n" + MIRROR + "X\n"), (TNC, "L X+1 Y+1 RL F100\n" + ROTATION + "ROT+9\n"),
+    (TNC, ROTATION + "ROT+9\nL X+1 Y+1 F100 M128\n"), (TNC, MIRROR + "Z\n"), (TNC, MIRROR + "X\nLP PR+10 PA+0 FMAX\n"),
+    (TNC, MIRROR + "X\nTRANS DATUM AXIS X+1\n"), (TNC, ROTATION + "ROT+9\nL X+1 Y+1 FMAX\nL X+1 Y+1 FMAX M91\nL X+2 FMAX\n"),
     (TNC, MIRROR + "X\nL X+1 F100 M128\n"), (TNC, "L X+1 Y+1 RL F100\n" + MIRROR + "X\n"),
     (TNC, MIRROR + "X\nCYCL DEF 10.0 ROTATION\nCYCL DEF 10.1 ROT+9\n"),
     (TNC, MIRROR + "X\nCYCL CALL POS X+1 Y+1 Z+0 FMAX\n"),

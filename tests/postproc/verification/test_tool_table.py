@@ -18,7 +18,8 @@ CL = Path(__file__).parents[2] / "golden" / "short_five_axis.apt"
 TABLES = {
     "linuxcnc": "; table\nT1 P1 Z+120.031 D6.0 ;T9 Z1 in a remark\nT2 P2 D10 Z95.5\nT3 P3 D1\n",
     "generic-iso": "T1 P1 Z120.031\nT2 P2 Z95.5\n",
-    "fanuc-30i": "%\nN1 G90 G10 L10. P1 R120.\nG10 L10 P1 R120.\nG10 L11 P1 R0.031\nG10L10P2R95.5\nG10 L12 P1 R5.\n%\n",
+    "fanuc-30i": "%\nN1 G90 G10 L10. P1 R120.\nG10 L10 P1 R120.\nG10 L11 P1 R0.031\nG10L10P2R95.5 ;\n"
+                 "G10 L11 P2 R0;\nG10 L12 P1 R5.\n%\n",
     "haas-ngc": "%\nO01234\nG10 L10 P1 R120.031 (T9)\nG10 L10 P2 R95.5\nM30\n%\n",
     "siemens-840d": "N10 $TC_DP1[1,1]=120\nN20 $TC_DP3[1,1]=120 $TC_DP12[1,1]=0.031\n$TC_DP3[2,1]=90\n$TC_DP21[2,1]=5.5\n"
                     "$TC_DP3[2,2]=7\n",
@@ -61,7 +62,8 @@ OFS = """<OFFSETS>
 
 def test_the_file_of_offsets_that_haas_saves() -> None:
     """Tools without a length are none; a number that is none has its line."""
-    assert read(OFS, "haas-ngc").lengths == pytest.approx({1: 120.031, 2: 95.5})
+    for table in (OFS, OFS.replace("<TOOL_OFFSET>", "").replace("</TOOL_OFFSET>", "")):
+        assert read(table, "haas-ngc").lengths == pytest.approx({1: 120.031, 2: 95.5})
     with pytest.raises(DiagnosticError) as caught:
         read(OFS.replace("0.031", "0,031"), "haas-ngc")
     assert list(caught.value.diagnostics[0].lines) == [6]
