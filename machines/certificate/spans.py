@@ -48,8 +48,8 @@ class Span:
 
     def __mul__(self, other: Span | Floats | float) -> Span:
         of = spanned(other)
-        ends = np.stack(np.broadcast_arrays(self.lo * of.lo, self.lo * of.hi, self.hi * of.lo, self.hi * of.hi))
-        return Span(ends.min(axis=0), ends.max(axis=0))
+        a, b, c, d = self.lo * of.lo, self.lo * of.hi, self.hi * of.lo, self.hi * of.hi
+        return Span(np.minimum(np.minimum(a, b), np.minimum(c, d)), np.maximum(np.maximum(a, b), np.maximum(c, d)))
 
     def over(self, other: Span) -> Span:
         """self / other; everywhere where 0 is between the ends of `other`."""

@@ -6,7 +6,7 @@ import re
 
 from machines.sheet.model import PivotForm
 
-_NUMBER = r"-?(?:\d+\.?\d*|\.\d+)"
+_NUMBER = r"-?(?:\d+(?:\.\d*)?|\.\d+)"
 _FANUC = re.compile(rf"N\d{{5}}(?P<words>(?:\s*[A-MO-Z]{_NUMBER})+)\s*;?$")
 """N19700 R-381.0, N19700 P1 R-381.0 of G10 L52; N19700Q1L1P-381.0 of a list of parameters"""
 _SIEMENS = re.compile(rf"(?:N\d+\s*)?\$TC_CARR\d+\[(?P<carrier>\d+)\]\s*=\s*(?P<value>{_NUMBER})$")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +21,7 @@ TURNS = 3
 """conversions in which only the operations that errors name take the next mode; then all of that mode do"""
 SAME_IN_ALL = frozenset({"reach.axis", "reach.position", "axis.spin"})
 """errors that no output mode changes"""
+TRAVEL = "travel.exceeded"
 ASK_AUTO = "--output-mode auto takes the next mode where one cannot be proved"
 NONE_DOES = "no output mode of this control and machine is proved for it: "
 COARSER = "a coarser --tolerance may do; else report CL file, machine and controller file as a fault of postproc"
@@ -35,22 +36,28 @@ def with_next_modes(result: PostResult, staged: StagedAgain) -> PostResult:
     job = first.job
     if first.ok or job is None or not _depends(first, job.modes):
         return with_remedies(first)
-    modes, why, tried = job.modes, dict[tuple[int, InterpolationMode], Diagnostic](), {_assigned(job.modes)}
+    modes, why = job.modes, dict[tuple[int, InterpolationMode], Diagnostic]()
+    tried = {_assigned(modes): (modes, first)}
     for turn in range(TURNS + len(_LAWS)):
         if made.job is None or not _depends(made, modes) or not (more := _refusals(made, made.job, modes, turn)):
             break
         why |= _reasons(made, made.job, modes, more)
         modes = replace(modes, refused=modes.refused | more)
         made = staged(replace(result, refused=modes.refused, keep="all"))
-        tried.add(_assigned(modes))
+        tried[_assigned(modes)] = modes, made
         if made.ok:
             return _said(first, made, job, modes, why)
+        if _same_in_all(tried.values(), job):
+            return with_remedies(first)
     for alone in _each_alone(job.modes):
         if _assigned(alone) in tried:
             continue
         made = staged(replace(result, refused=alone.refused, keep="all"))
+        tried[_assigned(alone)] = alone, made
         if made.ok:
             return _said(first, made, job, alone, why)
+        if _same_in_all(tried.values(), job):
+            break
     return with_remedies(first)
 
 
@@ -60,6 +67,19 @@ def _depends(made: PostResult, modes: OutputModes) -> bool:
         return False
     errors = _errors(made)
     return not any(d.code.startswith("witness.") for d in errors) and any(d.code not in SAME_IN_ALL for d in errors)
+
+
+def _same_in_all(tried: Collection[tuple[OutputModes, PostResult]], job: Job) -> bool:
+    """True where an axis goes beyond its travel at one place by the same, in every mode that the operation there can take:
+    the place is outside travel, whatever words lead there."""
+    free = replace(job.modes, refused=frozenset())
+    same = set.intersection(*({(d.message, d.lines[0]) for d in _errors(made) if d.code == TRAVEL and d.lines}
+                              for _, made in tried))
+    for _, line in same:
+        had = {one for modes, made in tried for one in _named(made, job, modes, {line})}
+        if had and all((k, law) in had for k, _ in had for constant in (True, False) for law in free.possible(k, constant)):
+            return True
+    return False
 
 
 def _auto(modes: OutputModes) -> list[int]:

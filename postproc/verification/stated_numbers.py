@@ -15,7 +15,7 @@ from toolpaths.arrays import distinct
 from toolpaths.diagnostics import Diagnostic, error
 
 _MARK = re.compile(rf"(?i){SETUP_MARK} ([0-9a-f]{{8}})\b")
-_OFFSET = re.compile(r"(?i)work offset ([^:,]{1,60}?) in machine coordinates([^:,]*): ?((?:[A-Z]-?\d+\.?\d*(?: |$))*)")
+_OFFSET = re.compile(r"(?i)work offset ([^:,]{1,60}?) in machine coordinates([^:,]*): ?((?:[A-Z]-?\d+(?:\.\d*)?(?: |$))*)")
 _STANDING = re.compile(r"(?i) with ([a-c]) at (-?[\d.e-]+)")
 _LENGTH = r"(?i)\btool T{}\b(?:(?!\btool T\d).)*?gauge length (-?[\d.]+|not stated)"
 _WORD = re.compile(r"([A-Za-z])(-?\d+\.?\d*)")

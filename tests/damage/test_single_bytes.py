@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from records import Record, damaged, outcome, read, records
 
+from toolpaths.diagnostics import Severity, has_errors
+
 RECORDS = list(records())
 COMMON = b"0.,-$/ \nXE("
 """bytes that stand for all others: digits, what numbers and fields end with, blanks, line ends, letters, other signs"""
@@ -43,6 +45,32 @@ def test_no_damage_is_lost(record: Record) -> None:
 def test_every_byte_of_a_short_motion_by_every_common_one(name: str) -> None:
     record = next(r for r in RECORDS if r.name == name)
     assert losses(record, COMMON, b",$") == []
+
+
+@pytest.mark.parametrize("text", [
+    "FROM/ 1.0, 2.0, 9.0", "GOTO/ 1.0, 2.0, 3.0", "GOTO/ 1, 2, 3, 0, 0, 1", "GODLTA/ 1.0, 2.0, 3.0", "TLAXIS/ 0.0, 0.0, 1.0",
+    "CIRCLE/ 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 5.0", "MSYS/ 0, 0, 5, 1, 0, 0, 0, 1, 0"])
+def test_a_comma_that_became_a_digit_is_seen(text: str) -> None:
+    """The blank behind it would still keep the numbers apart: -75.0, -40.0 and -75.03 -40.0 are two places."""
+    head, tail = "UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nFEDRAT/MMPM,100\nGOTO/9,9,9\n", "\nGOTO/9,9,8\nFINI\n"
+    commas = [k for k, sign in enumerate(text) if sign == ","]
+    for k in commas:
+        found = read(f"{head}{text[:k]}7{text[k + 1:]}{tail}".encode()).diagnostics
+        assert "cl.number" in {d.code for d in found if d.severity is Severity.ERROR}, text[:k]
+    whole = text.replace(", ", "  ") if text.startswith("GO") else text
+    assert "cl.number" not in {d.code for d in read(f"{head}{whole}{tail}".encode()).diagnostics}
+
+
+@pytest.mark.parametrize(("unit", "others"), [("MMPM", "MPM MMPS"), ("IPM", "FPM IPS")])
+def test_a_feed_in_a_unit_one_letter_apart_from_the_others_is_seen(unit: str, others: str) -> None:
+    """A thousand times as fast, or sixty. Feeds per revolution stand next to those per minute: taps."""
+    text = "UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nFEDRAT/{},100\nGOTO/1,2,3\nFEDRAT/{},200\nGOTO/4,5,6\nFINI\n"
+    for other in others.split():
+        for both in ((unit, other), (other, unit)):
+            [found] = [d for d in read(text.format(*both).encode()).diagnostics if d.severity is Severity.ERROR]
+            assert found.code == "cl.feed" and found.lines == (6,) and "line 4" in found.message
+    for both in ((other, other), (unit, unit), (unit, f"{unit[:-1]}R")):
+        assert not has_errors(read(text.format(*both).encode()).diagnostics)
 
 
 @pytest.mark.skipif("DAMAGE" not in os.environ,

@@ -108,6 +108,8 @@ class ToolpathBuilder:
 
     def _start_tracks(self) -> None:
         self.feed: ModalValue[tuple[float, FeedMode]] = ModalValue((float("nan"), FeedMode.PER_TIME))
+        self.feed_units: dict[str, int] = {}
+        """units that feeds are stated in, and the line of the first in each"""
         self.tool: ModalValue[Tool | None] = ModalValue(None)
         self.operation = ModalValue(-1)
         self.cycle = ModalValue(-1)

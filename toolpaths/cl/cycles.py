@@ -9,7 +9,7 @@ from dataclasses import replace
 from toolpaths.choices import CycleKind
 from toolpaths.cl.build import Heights, ToolpathBuilder
 from toolpaths.cl.cycle_words import KINDS, CycleValues, StatedValues, kind_of, values
-from toolpaths.cl.feeds import feed_in
+from toolpaths.cl.feeds import feed_in, stated_in
 from toolpaths.cl.text.dialects import Planes
 from toolpaths.cl.text.statements import Statement, Word
 from toolpaths.toolpath import Cycle, FeedMode
@@ -171,6 +171,7 @@ def _cycle_feed(b: ToolpathBuilder, v: CycleValues) -> tuple[float, FeedMode, fl
         pitch = MM_PER_INCH / v.threads
         return pitch, FeedMode.PER_REVOLUTION, pitch
     if v.feed is not None:
+        stated_in(b, f"CYCLE/{v.kind}", v.feed[1])
         feed, mode = feed_in(*v.feed, b.scale)
         return feed, mode, feed if v.kind == "TAP" and mode is FeedMode.PER_REVOLUTION and pitch is None else pitch
     if v.kind == "TAP" and pitch is not None:

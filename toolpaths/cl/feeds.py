@@ -17,6 +17,8 @@ PER_SECOND = {"MMPS": 1.0, "IPS": MM_PER_INCH}
 PER_REVOLUTION = {"MMPR": 1.0, "IPR": MM_PER_INCH, "FPR": MM_PER_FOOT, "PERREV": math.nan}
 UNITS = frozenset(PER_MINUTE) | frozenset(PER_SECOND) | frozenset(PER_REVOLUTION)
 """NaN: the unit of the part."""
+_ALIKE = (("MMPM", "MPM", "MMPS"), ("IPM", "FPM", "IPS"))
+"""Units that are one letter apart: a file keeps to one of them, and a byte that is lost or changed makes another."""
 _CHANGING = ("SCALE", "LENGTH", "LOCK", "MAXIPM")
 """Words of FEDRAT (NCL) that change the feed of the moves behind them."""
 _MODIFIERS = (*_CHANGING, "MAXRPM", "OVPLOT")
@@ -37,6 +39,19 @@ def feed_in(value: float, unit: str, scale: float) -> FeedValue:
 def unit_of(words: tuple[Word, ...]) -> str:
     """The first feed unit among the words, "" where there is none."""
     return next((w for w in words if isinstance(w, str) and w in UNITS), "")
+
+
+def stated_in(b: ToolpathBuilder, record: str, unit: str) -> None:
+    """Refuse a unit that is one letter apart from that of other feeds of the file, once."""
+    if unit in b.feed_units:
+        return
+    for alike in _ALIKE:
+        others = [(line, one) for one, line in b.feed_units.items() if unit in alike and one in alike and one != unit]
+        if others:
+            line, other = min(others)
+            b.log.error("cl.feed", f"{record}: a feed in {unit}, that of line {line} is in {other}", b.line,
+                        f"write all feeds of the file in one unit: {unit} and {other} are one letter apart", key=unit)
+    b.feed_units[unit] = b.line
 
 
 def fedrat(b: ToolpathBuilder, s: Statement) -> None:
@@ -62,6 +77,7 @@ def fedrat(b: ToolpathBuilder, s: Statement) -> None:
         b.log.warning("cl.feed-option", f"FEDRAT/{s.body}: only the feed itself is used", b.line)
     unit = unit_of(s.words)
     value = s.after(unit)
+    stated_in(b, f"FEDRAT/{s.body}", unit)
     b.feed.set(b.row, feed_in(numbers[0] if value is None else value, unit, b.scale))
 
 
@@ -69,6 +85,7 @@ def many(b: ToolpathBuilder, s: Statement, numbers: Floats) -> None:
     """Set the modal feed by neighbouring statements (`feed_lines`) from the current one on, `s` but for their numbers."""
     unit, at = unit_of(s.words), b.index
     feeds = [feed_in(number, unit, b.scale) for number in numbers.tolist()]
+    stated_in(b, f"FEDRAT/{s.body}", unit)
     for before, feed in zip(b.program.before[at:at + len(numbers)], feeds, strict=True):
         b.row += before - b.fast
         b.fast = before

@@ -26,6 +26,8 @@ _MOTION = re.compile(r"\W*(?:GOTO|GODLTA|RAPID|CIRCLE|MOVARC|GOHOME)\b|IF\s*\(|.
 _MOVING = ("CYCLE", "CALL")
 """Beginnings of words that drill or call a program, whatever a system makes of them (CYCLE81, CALLSUB)."""
 _DEEPEST = 8
+_WITH_COMMAS = frozenset({"GOTO", "GODLTA", "FROM", "CIRCLE", "TLAXIS", "MSYS"})
+"""records of numbers: where one comma stands between them all do, and a comma that became a digit is seen"""
 _MOST_ROWS = 50_000_000
 
 
@@ -50,11 +52,22 @@ def run(b: ToolpathBuilder, start: int, stop: int) -> None:
         if i in b.program.feeds:
             feeds.many(b, statement, b.program.feeds[i][:stop - i])
         elif handler is not None:
+            if statement.major in _WITH_COMMAS and "," in statement.body:
+                _commas(b, statement)
             handler(b, statement)
         else:
             _other(b, statement)
         b.index += 1
     b.stop = outer
+
+
+def _commas(b: ToolpathBuilder, s: Statement) -> None:
+    """Refuse numbers with a blank alone between them in a record that has commas: a comma may be damaged there."""
+    for part in s.body.split(","):
+        if len(part.split()) > 1:
+            b.log.error("cl.number", f"{s.major}/{s.body[:60]}: a blank without a comma in {' '.join(part.split())}", b.line,
+                        "put a comma between the numbers, or take the blank out of the number")
+            return
 
 
 def _subprograms(b: ToolpathBuilder) -> Subprograms:

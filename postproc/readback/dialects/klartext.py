@@ -38,7 +38,7 @@ _SKIPPED = re.compile(rb"(?m)^[ \t]*/[ \t]*(\d+[ \t]+)")
 _JOINED = re.compile(rb"~[ \t]*\n")
 _SLOW = re.compile(rb"(?m)^(?![ \t]*(?:\d+[ \t]+)?L[ \t](?![^\n]*M12[89]))[^\n]+$")
 _HEAD = re.compile(rb"(?m)^[ \t]*(?:\d+[ \t]+)?L[ \t]")
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)"
+_NUMBER = r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)"
 _WORD = re.compile(rf"\s*(?:(?P<fmax>F ?MAX)|(?P<side>R[0LR])(?![\d.])|(?P<sense>DR[-+])"
                    rf"|(?P<letter>IP[AR]|P[AR]|I?[XYZABCUVW]|[FMSRN])\s*(?P<number>{_NUMBER}))\s*")
 _QWORD = re.compile(rf"Q(\d+)\s*=\s*({_NUMBER})")
@@ -219,7 +219,7 @@ def _named(body: str) -> DialectStatement | None:
         return DialectStatement("TOOL CALL", (float(match[1]) if match[1] else None, match[2]),
                                 _keyed(match[3]))
     if match := re.fullmatch(r"CYCL DEF (\d+)(?:\.(\d+))?\b(.*)", body):
-        if match[2] is None and not re.fullmatch(rf"[^=]*?(?:\s*Q\d+\s*=\s*{_NUMBER}\s*)*", match[3]):
+        if match[2] is None and not re.fullmatch(rf"[^=]*?(?:Q\d+\s*=\s*{_NUMBER}\s*)*", match[3]):
             return None
         values = keys if match[2] is None else _keyed(match[3])
         return DialectStatement("CYCL DEF", (float(match[1]), float(match[2]) if match[2] else None, match[3].strip()),

@@ -29,7 +29,7 @@ from postproc.readback.text.flow import DEEPEST
 
 _SEQUENCE = re.compile(r"N\d+")
 _PROGRAM = re.compile(r"O(\d+)")
-_PLAIN = re.compile(r"(?:[A-Z][-+]?(?:\d+\.?\d*|\.\d+))+")
+_PLAIN = re.compile(r"(?:[A-Z][-+]?(?:\d+(?:\.\d*)?|\.\d+))+")
 _WORD = re.compile(r"([A-Z])([-+]?(?:\d+\.?\d*|\.\d+))")
 _PRINTED = re.compile(r"(?:POPEN|PCLOS|[BD]PRNT\[.*\]|SETVN#.*)$")
 _LETTER = re.compile(r"[A-Z]")

@@ -15,7 +15,7 @@ from postproc.readback.text.flow import DEEPEST
 _SEQUENCE = re.compile(r"N\d+(?:\.\d*)?")
 _LABEL = re.compile(r"O(<[^<>]+>|\d+)([A-Z]*)")
 _COMPUTED = re.compile(r"O\[")
-_PLAIN = re.compile(r"(?:[A-Z][-+]?(?:\d+\.?\d*|\.\d+))+")
+_PLAIN = re.compile(r"(?:[A-Z][-+]?(?:\d+(?:\.\d*)?|\.\d+))+")
 _WORD = re.compile(r"([A-Z])([-+]?(?:\d+\.?\d*|\.\d+))")
 _LETTER = re.compile(r"[A-Z]")
 _KEYWORD = re.compile(r"[A-Z]+")

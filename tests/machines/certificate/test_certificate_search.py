@@ -78,13 +78,12 @@ def test_figures_of_a_pose_are_those_of_the_machine(name: str) -> None:
 @pytest.mark.parametrize("name", KINDS)
 def test_rates_of_the_matrices_are_their_differences(name: str) -> None:
     poses, _, pose = boxes(machines.load(name), 20)
-    change, h = enclosed(poses, pose).change.lo, 1e-4
+    here, h = enclosed(poses, pose), 1e-4
     for i in range(5 if poses.legs.turns == "abc" else 3 + bool(poses.legs.turns)):
         step = h * np.eye(5)[i]
-        ahead, behind = (enclosed(poses, spanned(pose.lo + s * step)).matrix.lo for s in (1.0, -1.0))
-        np.testing.assert_allclose(change[:, i], (ahead - behind) / (2.0 * h), atol=1e-7)
-        ahead, behind = (enclosed(poses, spanned(pose.lo + s * step)).cosine.lo for s in (1.0, -1.0))
-        np.testing.assert_allclose(enclosed(poses, pose).cosine_change.lo[:, i], (ahead - behind) / (2.0 * h), atol=1e-7)
+        ahead, behind = (enclosed(poses, spanned(pose.lo + s * step)) for s in (1.0, -1.0))
+        for rate, a, b in ((here.change, ahead.matrix, behind.matrix), (here.cosine_change, ahead.cosine, behind.cosine)):
+            np.testing.assert_allclose(rate.lo[:, i], (a.lo - b.lo) / (2.0 * h), atol=1e-7)
 
 
 @pytest.mark.parametrize("name", ["uranesx", "hexapod", "h4a-c-table", "planar-delta-z", "triaglide"])

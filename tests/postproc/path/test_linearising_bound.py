@@ -76,7 +76,7 @@ def curves_for(name: str, count: int, seed: int) -> tuple[Curves, np.ndarray, np
 
 def truth(name: str, control: Control, curves: Curves, qa: np.ndarray, qb: np.ndarray, ua: np.ndarray,
           ub: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Largest (tip, axis) deviation of each block at 67 places: nearest point of the line, great circle there."""
+    """Largest (tip, axis) deviation of each block at 41 places: nearest point of the line, great circle there."""
     kin = machine(name).kinematics.with_tool(80.0)
     tip_off, axis_off = np.zeros(len(qa)), np.zeros(len(qa))
     span = curves.end - curves.start
@@ -84,7 +84,7 @@ def truth(name: str, control: Control, curves: Curves, qa: np.ndarray, qb: np.nd
     whole = angle(curves.axis0, curves.axis1)
     normal = np.cross(curves.axis0, curves.axis1)
     normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-    for t in np.linspace(0, 1, 67):
+    for t in np.linspace(0, 1, 41):
         tip, axis, _ = control.between(qa, qb, np.full(len(qa), t), kin)
         u = np.clip(((tip - curves.start) * span).sum(axis=1) / size, 0, 1)
         tip_off = np.maximum(tip_off, np.linalg.norm(tip - curves.start - u[:, None] * span, axis=1))

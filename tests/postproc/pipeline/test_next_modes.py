@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +18,7 @@ import toolpaths
 from postproc.base.options import Options
 from postproc.control.control import MODE_NAMES, tool_frames
 from postproc.job.job import prepare
+from postproc.pipeline import convert, stages
 from postproc.pipeline.next_modes import COARSER
 from postproc.pipeline.result import PostResult
 from postproc.readback.execution.frames import tool_frame
@@ -24,6 +27,7 @@ from postproc.verification.read_back import read_back
 from tests.hard.run import Task, failures, files_of, table, worked
 from tests.postproc.correction.test_compensation_holes import HEIGHTS, PLACES
 from tests.postproc.correction.test_compensation_points import both_directions_of_all
+from tests.postproc.kit import toolpath
 from toolpaths.diagnostics import Severity, error, has_errors
 from toolpaths.rotations import rotation
 
@@ -156,6 +160,25 @@ def test_what_no_mode_converts_fails_once_with_what_to_do(monkeypatch: pytest.Mo
     assert not result.ok and result.text == "" and {d.code for d in bad} == {"verify.path"}
     assert all(d.hint.endswith(COARSER) for d in bad)
     assert "output.next_mode" not in {d.code for d in result.diagnostics}
+
+
+def test_a_place_outside_travel_is_looked_at_once_in_each_mode(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Words of another mode lead to the same place, and each mode alone says so. Where it is another place in each
+    conversion, all combinations are tried."""
+    path, setup = toolpath("RAPID", "GOTO/0,0,20", "GOTO/5,0,0", "GOTO/900,0,0"), SAMPLES / "tools.setup.toml"
+    def conversions(elsewhere: bool) -> int:
+        made: list[PostResult] = []
+
+        def counted(*given: Any) -> PostResult:
+            made.append(stages.staged(*given))
+            return replace(made[-1], diagnostics=tuple(
+                replace(d, message=f"{d.message} {elsewhere * len(made)}") for d in made[-1].diagnostics))
+        monkeypatch.setattr(convert, "staged", counted)
+        assert not postproc.convert(path, "mikron-ucp710", "siemens-840d", setup).ok
+        return len(made)
+    assert conversions(elsewhere=False) == len(MODES) < conversions(elsewhere=True)
+    alone = [postproc.convert(path, "mikron-ucp710", "siemens-840d", setup, Options(output=mode)) for mode in MODES]
+    assert all("axis X goes to 900.0000 mm" in "".join(d.message for d in one.diagnostics) for one in alone)
 
 
 @pytest.mark.covering

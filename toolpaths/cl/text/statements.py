@@ -245,7 +245,7 @@ class Lexer:
         depth = 0
         while True:
             part, continued, lost = _cut(text, not parts and text.startswith(DATA_COMMENT), text_word)
-            parts.append(part)
+            parts.append("," + part if parts and _numbers_meet(parts[-1], part) else part)
             if lost.startswith(DATA_COMMENT):
                 self.log.error("cl.data-comment", f"{lost[:40]!r} stands behind a record: the end of a line is missing",
                                self.scan.line[self.next - 1], "put the remark on a line of its own")
@@ -289,6 +289,13 @@ class Lexer:
         if slash:
             return self.known(major)
         return major in BARE_WORDS or _text_statement(text) is not None
+
+
+def _numbers_meet(before: str, behind: str) -> bool:
+    """Whether lines that are joined have a blank alone between two numbers, where others of a record have a comma."""
+    last, first = before.rstrip()[-1:], behind.lstrip()[:1]
+    apart = before[-1:].isspace() or behind[:1].isspace()
+    return apart and bool(last and first) and last in _NUMBER_ENDS and first in _NUMBER_STARTS
 
 
 def _cut(text: str, comment: bool, text_word: bool) -> tuple[str, Literal["", "certain", "maybe"], str]:
