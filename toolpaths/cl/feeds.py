@@ -42,8 +42,9 @@ def unit_of(words: tuple[Word, ...]) -> str:
 
 
 def stated_in(b: ToolpathBuilder, record: str, unit: str) -> None:
-    """Refuse a unit that is one letter apart from that of other feeds of the file, once."""
-    if unit in b.feed_units:
+    """Refuse a unit that is one letter apart from that of other feeds of the file, once; text of our own writer takes for
+    each feed the unit in which it reads back to the bit."""
+    if unit in b.feed_units or b.declared:
         return
     for alike in _ALIKE:
         others = [(line, one) for one, line in b.feed_units.items() if unit in alike and one in alike and one != unit]

@@ -72,8 +72,9 @@ def test_a_plan_counts_the_way_by_home_where_the_tool_waits_there_to_index() -> 
     assert setup is not None
     program = convert(strips(), m, "haas-ngc", setup, options)
     assert program.ok and program.choice is not None, [str(d) for d in program.diagnostics]
-    counted = program.choice.plans["auto"].seconds
-    assert counted == pytest.approx(program_seconds(program), rel=0.025)
+    counted, written = program.choice.plans["auto"].seconds, program_seconds(program)
+    stops = 0.4 * program.text.count("G53 G0 G49")  # s: the way home begins from rest where its block takes the length off
+    assert written - stops < counted < 1.025 * written
     low, _ = orient(strips(), m, setup, options)
     assert low is not None and counted > low.plans["auto"].seconds + 1.0
 
