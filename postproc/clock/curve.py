@@ -11,8 +11,11 @@ on where the points stand; this one does not, and points rounded to 0.001 mm ben
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 
+from postproc.clock.tangents import tangents
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
@@ -34,6 +37,14 @@ ROUNDING = 0.0015
 """mm that points rounded to 0.001 mm may be off: the turn it makes over the shorter block is no bend"""
 BEFORE_CORNER = 0.3
 """of the shorter block: the radius at corners and rests, where curves may bend as they like"""
+SLACK, LONGER, FURTHER, WIDEST = 1.01, 1.05, 1.2, 2.8
+"""of what points may move, of an arc's length and height, rad that an arc turns: beyond those a curve has strayed from its
+points"""
+BY_CHORD = 0.5
+"""power of the chord by which splines through points are parametrised: centripetal (E. T. Y. Lee, Computer-Aided Design 21,
+1989)"""
+RIDGES = 0.0, 1e-12, 1e-10, 1e-8, 1e-6, 1e-4
+"""added to the scaled diagonal, one after the other, until the equations of very uneven points can be solved"""
 STRAIGHT = 1e-3
 """weight with which a direction is that of its block: it decides where nothing else does"""
 SAMPLES, WEIGHTS = (one / 2.0 for one in np.polynomial.legendre.leggauss(5))
@@ -86,8 +97,48 @@ def curve(flat: Floats, u: Floats, chord: Floats, smooth: Bools, tolerance: Floa
     corner = BEFORE_CORNER * np.minimum(np.append(chord, chord[-1]), np.append(chord[0], chord))
     radius = np.full(len(points), FLATTEST)
     radius[at] = np.where(inner, np.concatenate([corner[:1], _radii(turn, chord), corner[-1:]]), corner)
-    return _laid(FittedCurve(points, u[owner], u[owner], (chord / count)[owner], owner, ends), joined, at, stays,
-                 np.maximum(MOST * tolerance, FIXED), radius)
+    most = np.maximum(MOST * tolerance, FIXED)
+    line = FittedCurve(points, u[owner], u[owner], (chord / count)[owner], owner, ends)
+    laid = _laid(line, joined, at, stays, most, radius)
+    run = np.concatenate([[0], np.cumsum(~smooth)])
+    astray = np.bincount(run, weights=_astray(laid, flat, (u, chord), turn, most))[run] > 0.0
+    return _interpolated(laid, flat, (u, chord), smooth, astray) if astray.any() else laid
+
+
+def _astray(laid: FittedCurve, flat: Floats, blocks: tuple[Floats, Floats], turn: Floats, most: Floats) -> Bools:
+    """(N,) blocks whose ends have moved by more than `most` (N + 1,), or that are longer or further from their chord than an
+    arc of what their ends turn (N - 1,): points that scatter by more than their tolerance are of no curve near them."""
+    u, chord = blocks
+    at = np.concatenate([[0], laid.ends + 1])
+    off = ~(np.linalg.norm(laid.points[at] - flat, axis=1) <= SLACK * most)
+    half = np.minimum(np.append(turn, 0.0) + np.concatenate([[0.0], turn]), WIDEST) / 2.0
+    arc = chord * half / np.maximum(np.sin(half), 1e-12)
+    length = np.bincount(laid.owner, weights=_lengths(laid))
+    far = laid.points[:-1] + np.diff(laid.points, axis=0) / 2.0 + laid.along[:, None] * (laid.first - laid.last) / 8.0
+    far -= flat[laid.owner]
+    far -= (far * u[laid.owner]).sum(axis=1)[:, None] * u[laid.owner]
+    away = ~(np.linalg.norm(far, axis=1) <= (FURTHER * chord / 2.0 * np.tan(half / 2.0) + most[1:] + most[:-1])[laid.owner])
+    return np.asarray(off[1:] | off[:-1] | ~(length <= LONGER * np.where(half > 1e-6, arc, chord))
+                      | (np.bincount(laid.owner, weights=away) > 0.0))
+
+
+def _interpolated(laid: FittedCurve, flat: Floats, blocks: tuple[Floats, Floats], smooth: Bools,
+                  which: Bools) -> FittedCurve:
+    """The curve with the blocks of `which` (N,), whole runs from corner to corner, as splines through their points."""
+    u, chord = blocks
+    along = chord**BY_CHORD
+    first, last = tangents(u, chord, along, smooth)
+    keep, rows = ~which[laid.owner], np.flatnonzero(which)
+    owner = np.concatenate([laid.owner[keep], rows])
+    order = np.argsort(owner, kind="stable")
+
+    def merged(one: Floats, other: Floats) -> Floats:
+        return np.concatenate([one[keep], other[rows]])[order]
+
+    points = merged(laid.points[1:], flat[1:])
+    start = flat[:1] if which[0] else laid.points[:1]
+    return FittedCurve(np.concatenate([start, points]), merged(laid.first, first), merged(laid.last, last),
+                       merged(laid.along, along), owner[order], np.cumsum(np.bincount(owner, minlength=len(u))) - 1)
 
 
 def _laid(line: FittedCurve, joined: Bools, at: Ints, stays: Floats, most: Floats, radius: Floats) -> FittedCurve:
@@ -152,7 +203,7 @@ def _angle(one: Floats, other: Floats) -> Floats:
 def _least_rough(line: FittedCurve, h: Floats, joined: Bools, weight: Floats, radius: Floats) -> FittedCurve:
     """The curve of least sum of h (r^2 q''')^2 over the pieces, (r^2 jump of q'')^2/h over joined ends, and weight times
     (off the line)^2, by its normal equations; unknown is how far ends and directions are from the line's, by curve."""
-    from scipy.linalg import solveh_banded  # loaded where a control's clock is asked for
+    from scipy.linalg import LinAlgError, solveh_banded  # loaded where a control's clock is asked for
 
     row = np.cumsum(np.where(joined, 1, 2)) - 1  # of the end as the begin of a piece: corners are two, the end of one curve
     back = np.where(joined, row, row - 1)        # and the begin of the next
@@ -184,7 +235,13 @@ def _least_rough(line: FittedCurve, h: Floats, joined: Bools, weight: Floats, ra
     scale = 1.0 / np.sqrt(bands[5])
     for k in range(6):
         bands[k, 5 - k:] *= scale[5 - k:] * scale[:2 * n - (5 - k)]
-    found = scale[:, None] * solveh_banded(bands, scale[:, None] * right, overwrite_ab=True, check_finite=False)
+    for ridge in RIDGES:
+        bands[5] += ridge
+        with suppress(LinAlgError):
+            found = scale[:, None] * solveh_banded(bands, scale[:, None] * right, check_finite=False)
+            break
+    else:
+        found = np.full((2 * n, axes), np.nan)
     first, last = u[row[:-1]] + found[2 * row[:-1] + 1], u[back[1:]] + found[2 * back[1:] + 1]
     return FittedCurve(line.points + found[2 * row], first, last, h, line.owner, line.ends)
 

@@ -114,11 +114,12 @@ def extremes(path: JointPath, moves: Moves, control: Control, kinematics: Callab
 
 
 def _shorter_helps(kinematics: Kinematics, q: Floats, j: int, over: float) -> bool:
-    """True where the joints (J,) have a tool longer than joint `j` lacks, and that joint moves along it."""
-    if kinematics.tool_length <= over:
+    """True where the joints (J,) have a tool longer than joint `j` lacks, and that joint moves along it: `over` is positive
+    above its travel, negative below."""
+    if kinematics.tool_length <= abs(over):
         return False
     tip, axis = kinematics.forward(np.stack([q, q + np.eye(len(q))[j]]))
-    return bool(abs((tip[1] - tip[0]) @ axis[0]) > _ALONG)
+    return bool((tip[1] - tip[0]) @ axis[0] * np.sign(over) > _ALONG)
 
 
 def _excess(path: JointPath, moves: Moves, control: Control, j: int, bad: Ints, low: Floats, high: Floats, over: Floats,
@@ -140,7 +141,8 @@ def _excess(path: JointPath, moves: Moves, control: Control, j: int, bad: Ints, 
         hint = "turn the part in the set-up, or split the operation"
     else:
         others = [lowering] if linking else []
-        if _shorter_helps(kinematics(int(moves.tool[path.move[worst]])), path.q[worst], j, float(over[at])):
+        side = 1.0 if high[at] > machine.limits.upper[j] + TRAVEL_SLACK else -1.0
+        if _shorter_helps(kinematics(int(moves.tool[path.move[worst]])), path.q[worst], j, side * float(over[at])):
             others.append("use a shorter tool (gauge_length)")
         hint += "".join(f", {'or ' * (k + 1 == len(others))}{one}" for k, one in enumerate(others))
     return error("travel.exceeded", f"axis {machine.axis_names[j]} goes to {value * unit:.4f} {name}{linking}{where}, "

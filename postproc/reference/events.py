@@ -119,13 +119,19 @@ def speed_said(event: Event) -> float | None:
     return _rpm_said(event.values)
 
 
+def largest_said(event: Event) -> float | None:
+    """rev/min that a SPINDL record allows at most (MAXRPM); None where it states none."""
+    pairs = zip(event.values, event.values[1:], strict=False)
+    return next((float(v) for word, v in pairs if str(word).upper() == "MAXRPM" and isinstance(v, (int, float))), None)
+
+
 def cutting_speed_said(event: Event) -> float | None:
     """m/min of a SPINDL record with SMM, or with SFM in feet; None where it states none."""
     said = _words(event.values)
     if event.word != "SPINDL" or said.isdisjoint(_CUTTING_SPEED):
         return None
     speeds = [float(v) for before, v in zip(("", *event.values), event.values, strict=False)
-              if isinstance(v, (int, float)) and str(before).upper() not in _RANGES]
+              if isinstance(v, (int, float)) and str(before).upper() not in _RANGES | {"MAXRPM"}]
     return speeds[0] * (MM_PER_INCH * 12e-3 if "SFM" in said else 1.0) if len(speeds) == 1 else math.nan
 
 

@@ -14,13 +14,22 @@ import numpy as np
 
 from postproc.controllers.model import ControllerFile
 from postproc.reference.coolant import COMMANDS, LABELS, asked, coolant_words, written
-from postproc.reference.events import Spindle, numbers, speed_said, spindle_after, spindle_states, words
+from postproc.reference.events import (
+    Spindle,
+    cutting_speed_said,
+    largest_said,
+    numbers,
+    speed_said,
+    spindle_after,
+    spindle_states,
+    words,
+)
 from postproc.reference.tool_numbers import Report, check_numbers
 from toolpaths.diagnostics import Diagnostic, Severity
 from toolpaths.toolpath import Event, Toolpath
 from toolpaths.units import PER_MINUTE
 
-_SPINDLE = frozenset({"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "NEUTRL", "NEUTRAL"})
+_SPINDLE = frozenset({"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "MAXRPM", "NEUTRL", "NEUTRAL"})
 _RANGES = frozenset({"RANGE", "LOW", "MEDIUM", "HIGH"})
 _COOLANT = frozenset({"ON", "OFF", "FLOOD", "MIST", "THRU", "AIR"})
 _SIDES = frozenset({"LEFT", "RIGHT", "OFF"})
@@ -168,7 +177,10 @@ def _without_limits(events: tuple[Event, ...], report: Report) -> Iterator[Event
             yield event
             continue
         at = next(k for k, v in enumerate(event.values) if str(v).upper() == "MAXRPM")
-        limit = next((v for v in event.values[at + 1:at + 2] if isinstance(v, float)), None)
+        limit = largest_said(event)
+        if cutting_speed_said(event) is not None:  # kept, for the speed that the set-up puts in
+            yield event
+            continue
         rest = event.values[:at] + event.values[at + (1 if limit is None else 2):]
         bare = replace(event, values=rest)
         speed = speed_said(bare)
@@ -192,7 +204,10 @@ def _check_spindle(event: Event, report: Report) -> None:
     if {"NEUTRL", "NEUTRAL"} & said:
         report(Severity.WARNING, "spindle.neutral", "SPINDL/NEUTRL is written as a stop of the spindle",
                event.line, "")
-    speed = speed_said(event)
+    speed, limit = speed_said(event), largest_said(event)
+    if speed is not None and limit is not None and speed > limit:
+        report(Severity.ERROR, "spindle.limit", f"SPINDL: {speed:g} rev/min, but MAXRPM is {limit:g}", event.line,
+               "state a speed below it")
     if {"SFM", "SMM"} & said:
         report(Severity.ERROR, "spindle.surface_speed", "the spindle speed is given as a cutting speed", event.line,
                "state rev/min (SPINDL/RPM,n,CLW) in the CAM system, or add the speed to the set-up: [tools.N], or for all "

@@ -13,6 +13,8 @@ from postproc.reference.events import (
     TOOL_WORDS,
     Spindle,
     cutting,
+    cutting_speed_said,
+    largest_said,
     numbers,
     speed_said,
     spindle_after,
@@ -31,8 +33,8 @@ _COOLANT = {"off": "OFF", "flood": "FLOOD", "mist": "MIST", "through": "THRU", "
 _ALONG = 1e-9
 """by which the cosine between a straight retract and the tool axis may be less than 1"""
 _OFF = frozenset({"OFF", "NEUTRL", "NEUTRAL"})
-_OF_SPEED = frozenset({"RPM", "SFM", "SMM", "CLW", "CCLW", "ON"})
-_FASTEST = 400_000.0
+_OF_SPEED = frozenset({"RPM", "SFM", "SMM", "CLW", "CCLW", "ON", "RANGE", "LOW", "MEDIUM", "HIGH", "MAXRPM"})
+FASTEST = 400_000.0
 """rev/min: beyond the air-bearing spindles that drill circuit boards, the fastest that cut"""
 _DRY: tuple[str | float, ...] = ("OFF",)
 
@@ -134,11 +136,15 @@ def _with_speeds(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, Stated
         for k in range(use.begin, use.end):
             event = result[k]
             said = set(words(event))
-            if wanted is None or event.word != "SPINDL" or speed_said(event) != 0.0 or said - _OF_SPEED:
+            speed = cutting_speed_said(event)
+            if (wanted is None or event.word != "SPINDL" or speed_said(event) != 0.0 or said - _OF_SPEED
+                    or (speed is not None and not speed > 0.0)):
                 continue
             own = "CLW" if "CLW" in said else "CCLW" if "CCLW" in said else ""
             side = own or ("CLW" if wanted.direction == "clockwise" else "CCLW")
-            result[k] = replace(event, values=("RPM", wanted.rpm, side))
+            kept = [word for word in words(event) if word in ("RANGE", "LOW", "MEDIUM", "HIGH")]
+            most = largest_said(event)
+            result[k] = replace(event, values=("RPM", wanted.rpm, side, *kept, *(() if most is None else ("MAXRPM", most))))
             stated.setdefault((use.number, f"{wanted.rpm:g} rev/min" if own else str(wanted)), []).append(event.line)
     return replace(toolpath, events=tuple(result)), stated
 
@@ -244,7 +250,7 @@ def too_fast(toolpath: Toolpath, largest: float) -> list[Diagnostic]:
     """An error where the file, or the set-up for it, asks for more than the spindle's largest speed, rev/min: a control
     runs the largest, and feeds per turn and taps with it. Where the machine states none, what no spindle that mills does."""
     source, largest = ("the machine has at most {} ([control] largest_spindle_speed)", largest) if largest < math.inf else (
-        "no milling spindle turns faster than {}, and [control] largest_spindle_speed of the machine states none", _FASTEST)
+        "no milling spindle turns faster than {}, and [control] largest_spindle_speed of the machine states none", FASTEST)
     asked = [(state.rpm, line) for state, line in spindle_changes(toolpath) if state.rpm > largest]
     if not asked:
         return []

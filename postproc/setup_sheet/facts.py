@@ -14,10 +14,10 @@ from postproc.base.options import Options
 from postproc.control.modes import table_axes
 from postproc.controllers.model import ControllerFile
 from postproc.job.job import OF_SETUP, prepare
-from postproc.reference.events import cutting, cutting_speed_said, spindle_states
+from postproc.reference.events import cutting, cutting_speed_said, largest_said, spindle_states
 from postproc.reference.records import plain_records
 from postproc.reference.same_tool import differ
-from postproc.reference.spindle_defaults import Use, uses
+from postproc.reference.spindle_defaults import FASTEST, Use, uses
 from postproc.reference.stated_feeds import without_feed
 from postproc.reference.tool_numbers import numbered
 from postproc.reference.unnumbered_tools import UNNAMED, with_tools
@@ -197,13 +197,14 @@ def _tools(path: Toolpath) -> Iterator[ToolFacts]:
 
 def _cutting_speed(events: list[Event], tool: Tool) -> CuttingSpeed | None:
     """At the outside of the tool: v = pi d n."""
-    if not tool.diameter:
+    if not tool.diameter or not tool.diameter > 0.0:
         return None
     for event in events:
         speed = cutting_speed_said(event)
-        if speed is not None and speed > 0.0:
+        if speed is not None and 1.0 <= 1e3 * speed / (math.pi * tool.diameter) <= FASTEST:
             said = f"{event.word}/{','.join(f'{v:g}' if isinstance(v, float) else str(v) for v in event.values)}"
-            return CuttingSpeed(f"{said} at diameter {tool.diameter:.4g} mm", round(1e3 * speed / (math.pi * tool.diameter)))
+            rpm = min(round(1e3 * speed / (math.pi * tool.diameter)), largest_said(event) or math.inf)
+            return CuttingSpeed(f"{said} at diameter {tool.diameter:.4g} mm", rpm)
     return None
 
 

@@ -252,3 +252,21 @@ def test_no_program_takes_longer_than_with_a_rest_at_each_corner(step: Floats | 
     free = commanded(q, 0.01)
     rests = execute(replace(free, stop=np.ones(30, dtype=bool)), settings).seconds
     assert 0.6 * rests < execute(free, settings).seconds <= 1.03 * rests
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_no_curve_strays_from_points_that_stand_unevenly_or_scatter(noise: float) -> None:
+    """Blocks of 0.001 mm next to some mm had equations that are not solved, scattered points loops of many mm."""
+    rng = np.random.default_rng(9)
+    for _ in range(60):
+        radius = 10.0 ** rng.uniform(0, 2)
+        angle = np.cumsum(10.0 ** rng.uniform(rng.choice([-4.0, -2.0]), -0.5, int(rng.integers(8, 60))))
+        q = np.stack([np.cos(angle), np.sin(angle)], axis=1) * radius
+        q = np.round(q + rng.normal(size=q.shape) * noise, 3)
+        q = q[np.concatenate([[True], np.linalg.norm(np.diff(q, axis=0), axis=1) > 5e-4])]
+        length = np.linalg.norm(np.diff(q, axis=0), axis=1)
+        stop = np.isin(np.arange(len(q)), [0, len(q) - 1])
+        made, _, _, owner = fitted(CommandedPath(q, length, np.full(len(length), 100.0), np.full(len(q), 0.01), stop, np.ones(2)))
+        ends = np.append(np.flatnonzero(np.diff(owner)), len(owner) - 1) + 1
+        assert np.linalg.norm(made[ends] - q[1:], axis=1).max() < 0.0051
+        assert np.linalg.norm(np.diff(made, axis=0), axis=1).sum() < 1.15 * length.sum()

@@ -163,6 +163,16 @@ def test_of_a_cutting_speed_the_set_up_states_the_turns(record: str, side: str, 
     assert "verify.state" in {d.code for d in changed.diagnostics}
 
 
+def test_maxrpm_of_a_cutting_speed_limits_the_speed_of_the_set_up() -> None:
+    lines = ["UNITS/MM", "FEDRAT/MMPM,600", "LOADTL/1", "CUTTER/1,0", "SPINDL/SMM,200,MAXRPM,3000,CLW,RANGE,LOW", *CUT,
+             "GOTO/0,10,30"]
+    assert "spindle.limit" in {d.code for d in errors(made(lines, setup(t1={"spindle": {"rpm": 4000}})))}
+    fits = good(made(lines, setup(t1={"spindle": {"rpm": 3000}})))
+    assert "S3000 M3" in switched(fits.text) and "spindle.range" in {d.code for d in fits.diagnostics}
+    wrong = [line.replace("200", "-200") for line in lines]
+    assert "spindle.surface_speed" in {d.code for d in errors(made(wrong, setup(t1={"spindle": {"rpm": 3000}})))}
+
+
 def test_feeds_per_revolution_dwells_and_taps_count_with_it() -> None:
     of = setup({"spindle": {"rpm": 600}})
     assert "F60" in good(made([n.replace("MMPM,600", "MMPR,0.1") for n in HEAD], of)).text
