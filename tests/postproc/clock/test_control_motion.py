@@ -266,7 +266,8 @@ def test_no_curve_strays_from_points_that_stand_unevenly_or_scatter(noise: float
         q = q[np.concatenate([[True], np.linalg.norm(np.diff(q, axis=0), axis=1) > 5e-4])]
         length = np.linalg.norm(np.diff(q, axis=0), axis=1)
         stop = np.isin(np.arange(len(q)), [0, len(q) - 1])
-        made, _, _, owner = fitted(CommandedPath(q, length, np.full(len(length), 100.0), np.full(len(q), 0.01), stop, np.ones(2)))
+        speed, tolerance = np.full(len(length), 100.0), np.full(len(q), 0.01)
+        made, _, _, owner = fitted(CommandedPath(q, length, speed, tolerance, stop, np.ones(2)))
         ends = np.append(np.flatnonzero(np.diff(owner)), len(owner) - 1) + 1
         assert np.linalg.norm(made[ends] - q[1:], axis=1).max() < 0.0051
         assert np.linalg.norm(np.diff(made, axis=0), axis=1).sum() < 1.15 * length.sum()

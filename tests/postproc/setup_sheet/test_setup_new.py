@@ -376,7 +376,7 @@ def test_of_a_cutting_speed_the_turns_at_the_diameter_are_offered() -> None:
     facts = facts_of(path, machine("mill-3axis"), spec, Options())
     (speed,) = [q for q in questions_of(facts) if q.kind == "spindle"]
     assert not facts.refused and (speed.default, speed.assumed) == (5000, 5000) and "SPINDL/SMM,157.08" in speed.text
-    for said, diameter, offered in (("157.08,MAXRPM,3000", "10", 3000), ("0.0000001", "10", None), ("157.08", "0.000001", None)):
+    for said, diameter, offered in (("157.08,MAXRPM,3000", "10", 3000), ("0.0000001", "10", None), ("157.08", "1e-6", None)):
         text = f"UNITS/MM\nLOADTL/1\nCUTTER/{diameter},0\nSPINDL/SMM,{said},CLW\nFEDRAT/MMPM,100\n"
         path, _ = toolpaths.read_bytes(f"{text}GOTO/0,0,5\nGOTO/1,0,5\nGOTO/1,1,5\nGOTO/1,1,9\n")
         assert [q.default for q in questions_of(facts_of(path, machine("mill-3axis"), spec, Options()))
