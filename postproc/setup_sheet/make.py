@@ -15,7 +15,7 @@ from postproc.controllers.model import ControllerFile, load_controller
 from postproc.readback.comparison.length_margins import MUCH
 from postproc.setup.model import SetupFile
 from postproc.setup_sheet.facts import NumberedTool, SheetFacts, facts_of, named_tools, taken_numbers
-from postproc.setup_sheet.place import Fit, below_origin, beyond, fitted, found_place, looked_for
+from postproc.setup_sheet.place import Fit, below_origin, beyond, fitted, found_place, looked_for, odd_one
 from postproc.setup_sheet.questions import (
     Answer,
     GivenAnswers,
@@ -280,6 +280,8 @@ _ELSE = f"a machine with more travel, {_SHORTER}or a file for each side of the p
 def _not_fitted(fit: Fit) -> list[Diagnostic]:
     """Why no place fits, next to what stands against the first."""
     errors = [d for d in fit.result.diagnostics if d.severity is Severity.ERROR]
+    if odd := odd_one(fit.result, fit.result.toolpath):
+        return [*errors, *odd]
     tried = fit.nowhere or f"{fit.tried} place{'s' * (fit.tried > 1)} tried, none is possible"
     said = [info("place.found", tried
                  + "".join(f"; {why}" for why in fit.lacks[:3]),

@@ -149,14 +149,19 @@ def beyond(result: PostResult) -> bool:
     return all(d.code in PLACES for d in result.diagnostics if d.severity is Severity.ERROR)
 
 
+def odd_one(result: PostResult, toolpath: Toolpath) -> list[Diagnostic]:
+    """The one record that no place puts right, where every error may be one of the place and there is one."""
+    odd = odd_record(toolpath, _largest(result.machine)) if beyond(result) else None
+    return [] if odd is None else [odd]
+
+
 def found_place(result: PostResult, toolpath: Toolpath) -> list[Diagnostic]:
     """What `place` would find for a conversion that is refused by travel or reach: a note with [part], or why no place fits,
     or the one record that no place puts right; nothing for other refusals. `toolpath` is as it was read."""
     if result.ok or not beyond(result):
         return []
-    odd = odd_record(toolpath, _largest(result.machine))
-    if odd is not None:
-        return [odd]
+    if odd := odd_one(result, toolpath):
+        return odd
     if len(toolpath) > _MOST:
         return [_note("postproc setup new looks for a place that fits", "")]
     setup = result.setup

@@ -140,6 +140,10 @@ def test_one_wrong_number_is_one_error(what: str, tmp_path: Path) -> None:
     assert got.exit_code == 1 and codes[0] == code and set(codes) <= {code, "setup.offered"}, got.stderr
     line = next(k for k, text in enumerate(good.replace(old, new).splitlines(), 1) if new and new in text) if new else 0
     assert code != "path.odd_record" or f"p.apt:{line}:" in got.stderr
+    if what == "4000 for 40":  # which fits nowhere; a turned axis may in another attitude
+        made = run("setup", "new", tmp_path / "p.apt", "-m", tmp_path / "m.toml", "-o", tmp_path / "new.toml", "--yes")
+        assert made.exit_code == 1 and f"p.apt:{line}: error [{code}]" in made.stderr
+        assert "travel.exceeded" not in made.stderr and "place.found" not in made.stderr
 
 
 CUT = "GOTO/0,0,5\nFEDRAT/MMPM,600\nGOTO/0,0,0\nRAPID\nGOTO/0,0,9\nFINI"
