@@ -131,7 +131,8 @@ def _excess(path: JointPath, moves: Moves, control: Control, j: int, bad: Ints, 
     cuts = ~np.isnan(path.u[bad]) & (moves.kind[path.move[bad]] != Kind.RAPID)
     at = int(np.where(cuts | ~cuts.any(), over, 0.0).argmax())  # a link follows from the cuts at its ends
     worst = bad[at]
-    value = high[at] if high[at] > machine.limits.upper[j] + TRAVEL_SLACK else low[at]
+    above = high[at] > machine.limits.upper[j] + TRAVEL_SLACK
+    value = high[at] if above else low[at]
     lower, upper = machine.limits.lower[j] * unit, machine.limits.upper[j] * unit
     lines = np.unique(moves.line[path.move[bad]])
     first = int(moves.line[path.move[worst]])
@@ -141,8 +142,8 @@ def _excess(path: JointPath, moves: Moves, control: Control, j: int, bad: Ints, 
         hint = "turn the part in the set-up, or split the operation"
     else:
         others = [lowering] if linking else []
-        side = 1.0 if high[at] > machine.limits.upper[j] + TRAVEL_SLACK else -1.0
-        if _shorter_helps(kinematics(int(moves.tool[path.move[worst]])), path.q[worst], j, side * float(over[at])):
+        tool = kinematics(int(moves.tool[path.move[worst]]))
+        if _shorter_helps(tool, path.q[worst], j, float(over[at] if above else -over[at])):
             others.append("use a shorter tool (gauge_length)")
         hint += "".join(f", {'or ' * (k + 1 == len(others))}{one}" for k, one in enumerate(others))
     return error("travel.exceeded", f"axis {machine.axis_names[j]} goes to {value * unit:.4f} {name}{linking}{where}, "

@@ -179,10 +179,7 @@ def corrected(made: SolvedStage, progress: Progress | None) -> tuple[SolvedStage
     from postproc.correction.compensation import compensate
 
     options, file, moves = job.options, made.toolpath.file, made.moves
-    lower = job.setup.clearance.lower
-    far = check_travel(path, job.moves, job.control, job.kinematics, file, at_place(job.places, job.repeats, job.moves),
-                       lower)[0]
-    far += check_reach(path, job.moves, job.control, file, lower)
+    far, _ = _beyond(job, path, file)
     if has_errors(far):
         return made, with_system(far, job.work_system, job.placement, job.moves.axis)
     better, report, found = compensate(path, moves, block_tools(path, moves), job.kinematics, job.errors, job.modes,
@@ -193,12 +190,18 @@ def corrected(made: SolvedStage, progress: Progress | None) -> tuple[SolvedStage
     return handed_on(CorrectedStage, made, path=better, nominal=path, compensation=report), found
 
 
+def _beyond(job: Job, path: JointPath, file: str) -> tuple[list[Diagnostic], dict[str, tuple[float, float]]]:
+    """(where travel or reach end, extents of each axis)."""
+    lower = job.setup.clearance.lower
+    found, extents = check_travel(path, job.moves, job.control, job.kinematics, file,
+                                  at_place(job.places, job.repeats, job.moves), lower)
+    return [*found, *check_reach(path, job.moves, job.control, file, lower)], extents
+
+
 def checked(made: CorrectedStage, progress: Progress | None) -> tuple[CheckedStage, DiagnosticList]:
     """Travel, reach, distance from singular positions."""
     job, path, file = made.job, made.path, made.toolpath.file
-    found, extents = check_travel(path, job.moves, job.control, job.kinematics, file,
-                                  at_place(job.places, job.repeats, job.moves), job.setup.clearance.lower)
-    found += check_reach(path, job.moves, job.control, file, job.setup.clearance.lower)
+    found, extents = _beyond(job, path, file)
     found += check_singular(path, job.moves, job.control, job.setup.joints.singular_distance, file)
     return handed_on(CheckedStage, made, extents=extents), with_system(found, job.work_system, job.placement, job.moves.axis)
 

@@ -131,7 +131,7 @@ def cutting_speed_said(event: Event) -> float | None:
     if event.word != "SPINDL" or said.isdisjoint(_CUTTING_SPEED):
         return None
     speeds = [float(v) for before, v in zip(("", *event.values), event.values, strict=False)
-              if isinstance(v, (int, float)) and str(before).upper() not in _RANGES | {"MAXRPM"}]
+              if isinstance(v, (int, float)) and str(before).upper() not in RANGES | {"MAXRPM"}]
     return speeds[0] * (MM_PER_INCH * 12e-3 if "SFM" in said else 1.0) if len(speeds) == 1 else math.nan
 
 
@@ -146,12 +146,12 @@ def _rpm_said(values: tuple[str | float, ...]) -> float | None:
             word = str(before).upper()
             if word == "RPM":
                 return float(value)
-            if word not in _RANGES:
+            if word not in RANGES:
                 loose.append(float(value))
     return loose[0] if len(loose) == 1 else None
 
 
-_RANGES = frozenset({"RANGE", "LOW", "MEDIUM", "HIGH"})
+RANGES = frozenset({"RANGE", "LOW", "MEDIUM", "HIGH"})
 
 
 _CUTTING_SPEED = frozenset({"SFM", "SMM"})

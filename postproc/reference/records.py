@@ -15,6 +15,7 @@ import numpy as np
 from postproc.controllers.model import ControllerFile
 from postproc.reference.coolant import COMMANDS, LABELS, asked, coolant_words, written
 from postproc.reference.events import (
+    RANGES,
     Spindle,
     cutting_speed_said,
     largest_said,
@@ -30,7 +31,6 @@ from toolpaths.toolpath import Event, Toolpath
 from toolpaths.units import PER_MINUTE
 
 _SPINDLE = frozenset({"RPM", "CLW", "CCLW", "ON", "OFF", "SFM", "SMM", "MAXRPM", "NEUTRL", "NEUTRAL"})
-_RANGES = frozenset({"RANGE", "LOW", "MEDIUM", "HIGH"})
 _COOLANT = frozenset({"ON", "OFF", "FLOOD", "MIST", "THRU", "AIR"})
 _SIDES = frozenset({"LEFT", "RIGHT", "OFF"})
 _PLAIN_CUTCOM = frozenset({*_SIDES, "XYPLAN", "DIAMET", "RADIUS", "TOOL", "OSETNO", "LENGTH", "ADJUST"})
@@ -183,20 +183,23 @@ def _without_limits(events: tuple[Event, ...], report: Report) -> Iterator[Event
             continue
         rest = event.values[:at] + event.values[at + (1 if limit is None else 2):]
         bare = replace(event, values=rest)
-        speed = speed_said(bare)
-        if speed is not None and limit is not None and speed > limit:
-            report(Severity.ERROR, "spindle.limit", f"SPINDL: {speed:g} rev/min, but MAXRPM is {limit:g}", event.line,
-                   "state a speed below it")
+        _check_limit(speed_said(bare), limit, event.line, report)
         report(Severity.WARNING, "spindle.limit", "SPINDL: MAXRPM is not carried out, it limits cutting speeds, and speeds "
                "are in rev/min here", event.line, "")
         if rest:
             yield bare
 
 
+def _check_limit(speed: float | None, limit: float | None, line: int, report: Report) -> None:
+    if speed is not None and limit is not None and speed > limit:
+        report(Severity.ERROR, "spindle.limit", f"SPINDL: {speed:g} rev/min, but MAXRPM is {limit:g}", line,
+               "state a speed below it")
+
+
 def _check_spindle(event: Event, report: Report) -> None:
     said = set(words(event))
     for word in words(event):
-        if word in _RANGES:
+        if word in RANGES:
             report(Severity.WARNING, "spindle.range", f"SPINDL: {word} is not carried out", event.line, "")
         elif word not in _SPINDLE:
             report(Severity.ERROR, "spindle.word", f"SPINDL: {word} cannot be carried out", event.line,
@@ -204,16 +207,14 @@ def _check_spindle(event: Event, report: Report) -> None:
     if {"NEUTRL", "NEUTRAL"} & said:
         report(Severity.WARNING, "spindle.neutral", "SPINDL/NEUTRL is written as a stop of the spindle",
                event.line, "")
-    speed, limit = speed_said(event), largest_said(event)
-    if speed is not None and limit is not None and speed > limit:
-        report(Severity.ERROR, "spindle.limit", f"SPINDL: {speed:g} rev/min, but MAXRPM is {limit:g}", event.line,
-               "state a speed below it")
+    speed = speed_said(event)
+    _check_limit(speed, largest_said(event), event.line, report)
     if {"SFM", "SMM"} & said:
         report(Severity.ERROR, "spindle.surface_speed", "the spindle speed is given as a cutting speed", event.line,
                "state rev/min (SPINDL/RPM,n,CLW) in the CAM system, or add the speed to the set-up: [tools.N], or for all "
                "tools [output], spindle = { rpm = ..., direction = \"clockwise\" }")
-    elif speed is None and numbers(event) and "OFF" not in said and said <= _SPINDLE | _RANGES and (
-            not said & _RANGES or "RPM" in said):
+    elif speed is None and numbers(event) and "OFF" not in said and said <= _SPINDLE | RANGES and (
+            not said & RANGES or "RPM" in said):
         report(Severity.ERROR, "spindle.speed", "SPINDL: which of the numbers is the speed?", event.line,
                "write SPINDL/RPM,n,CLW")
     elif speed is not None and speed <= 0.0 and "OFF" not in said:

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from postproc.reference.events import (
+    RANGES,
     TOOL_WORDS,
     Spindle,
     cutting,
@@ -33,7 +34,7 @@ _COOLANT = {"off": "OFF", "flood": "FLOOD", "mist": "MIST", "through": "THRU", "
 _ALONG = 1e-9
 """by which the cosine between a straight retract and the tool axis may be less than 1"""
 _OFF = frozenset({"OFF", "NEUTRL", "NEUTRAL"})
-_OF_SPEED = frozenset({"RPM", "SFM", "SMM", "CLW", "CCLW", "ON", "RANGE", "LOW", "MEDIUM", "HIGH", "MAXRPM"})
+_OF_SPEED = RANGES | {"RPM", "SFM", "SMM", "CLW", "CCLW", "ON", "MAXRPM"}
 FASTEST = 400_000.0
 """rev/min: beyond the air-bearing spindles that drill circuit boards, the fastest that cut"""
 _DRY: tuple[str | float, ...] = ("OFF",)
@@ -142,7 +143,7 @@ def _with_speeds(toolpath: Toolpath, setup: SetupFile) -> tuple[Toolpath, Stated
                 continue
             own = "CLW" if "CLW" in said else "CCLW" if "CCLW" in said else ""
             side = own or ("CLW" if wanted.direction == "clockwise" else "CCLW")
-            kept = [word for word in words(event) if word in ("RANGE", "LOW", "MEDIUM", "HIGH")]
+            kept = [word for word in words(event) if word in RANGES]
             most = largest_said(event)
             result[k] = replace(event, values=("RPM", wanted.rpm, side, *kept, *(() if most is None else ("MAXRPM", most))))
             stated.setdefault((use.number, f"{wanted.rpm:g} rev/min" if own else str(wanted)), []).append(event.line)

@@ -197,14 +197,14 @@ def _tools(path: Toolpath) -> Iterator[ToolFacts]:
 
 def _cutting_speed(events: list[Event], tool: Tool) -> CuttingSpeed | None:
     """At the outside of the tool: v = pi d n."""
-    if not tool.diameter or not tool.diameter > 0.0:
+    if tool.diameter is None or not tool.diameter > 0.0:
         return None
     for event in events:
-        speed = cutting_speed_said(event)
-        if speed is not None and 1.0 <= 1e3 * speed / (math.pi * tool.diameter) <= FASTEST:
+        turns = 1e3 * (cutting_speed_said(event) or 0.0) / (math.pi * tool.diameter)
+        if 1.0 <= turns <= FASTEST:
             said = f"{event.word}/{','.join(f'{v:g}' if isinstance(v, float) else str(v) for v in event.values)}"
-            rpm = min(round(1e3 * speed / (math.pi * tool.diameter)), largest_said(event) or math.inf)
-            return CuttingSpeed(f"{said} at diameter {tool.diameter:.4g} mm", rpm)
+            most = largest_said(event) or math.inf
+            return CuttingSpeed(f"{said} at diameter {tool.diameter:.4g} mm", min(round(turns), most))
     return None
 
 
