@@ -4,7 +4,10 @@ By how much the lengths of tools may differ is a sixth of a conversion. It is lo
 (`postproc/verification`), in all other rooms (reports, pages), and in what rooms share (`kit.sample`). The second witness
 is another sixth. It hears every conversion on every machine and control, of modes and registers of controls, of compiled
 and written programs, of jobs, hints and pages, and those that rooms share; not those of rooms which choose axes, places and
-times, look at one part of the road by other means, or write reports, nor where LinuxCNC itself reads the program.
+times, look at one part of the road by other means, or write reports, nor where LinuxCNC itself reads the program. The bound
+between the places at which blocks are held to the file is a sixth of a small conversion too. It is proved on every machine
+and control, in the rooms of read-back, verification, proof and witness where tests are about it, and in what rooms share; in
+the others blocks are held to the file at places alone.
 
 Drawings are laid out and have their full number of dots in the tests of drawings; elsewhere panels stay where the grid puts
 them, which moves no text, and are rough. What a model of errors does is looked at at few places of the travel.
@@ -17,10 +20,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from machines.geometric_error.exchange import exports, survey
 from postproc.pipeline import stages
+from postproc.readback.comparison import compare
+from postproc.readback.comparison.bound_search import DeviationBound
+from postproc.readback.comparison.compare import bound_of_blocks
 from postproc.verification import length_limits, read_back, second_witness
 from postproc.witness.evidence import Testimony
 from toolpaths import drawing
@@ -42,7 +49,14 @@ HEARD = frozenset({"test_compensation_points.py", "test_corrected_legs.py", "tes
                    "test_retract_levels_of_holes.py", "test_shared_tables.py", "test_spin_plan.py", "test_split_plan.py",
                    "test_turning_axes.py", "test_turning_corners.py"})
 """files of these rooms that show what it says"""
-NAME, WITNESS = "length_margins", "second_witness"
+UNBOUNDED = UNHEARD | {TESTS / "postproc" / room for room in (
+    "compile", "control", "feedrate", "job", "joints", "page", "pipeline", "python", "setup", "writing")}
+"""rooms whose conversions are held to the tolerance at places alone: no test there looks at the bound between them"""
+BOUNDED = HEARD | {"test_cheap_bounds_read_back.py", "test_deviation_bound.py", "test_every_machine_and_control.py",
+                   "test_golden_programs.py", "test_own_kinds.py", "test_residuals.py", "test_whole_conversions.py",
+                   "test_worst_place.py"}
+"""files of these rooms that show it"""
+NAME, WITNESS, BOUND = "length_margins", "second_witness", "bound_of_blocks"
 DRAWN = frozenset({"test_drawing.py", "test_sheet.py", "test_run.py"})
 """files that look at how drawings are laid out, and at the same bytes of processes of their own"""
 ROUGH = 40
@@ -64,6 +78,11 @@ def _silent(*given: Any) -> tuple[Testimony, list[Any]]:
     return Testimony((), ()), []
 
 
+def _no_bound(motion: Any, executed: Any, moves: Any, owner: Any, *given: Any, **named: Any) -> DeviationBound:
+    """Of no block is anything found; none is said to have no bound."""
+    return DeviationBound(0.0, 0.0, -1, -1, 0, whole=np.full((2, int(moves.run_by(owner).sum())), np.inf))
+
+
 @pytest.fixture(autouse=True, scope="module")
 def lengths_looked_at_where_they_are_seen(request: pytest.FixtureRequest) -> Iterator[None]:
     """For every file of tests; the second witness and drawings too."""
@@ -78,6 +97,8 @@ def lengths_looked_at_where_they_are_seen(request: pytest.FixtureRequest) -> Ite
             patch.setattr(read_back, NAME, _none)
         if room in UNHEARD and name not in HEARD:
             patch.setattr(stages, WITNESS, _silent)
+        if room in UNBOUNDED and name not in BOUNDED:
+            patch.setattr(compare, BOUND, _no_bound)
         yield
 
 
@@ -87,4 +108,5 @@ def looked_at() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(read_back, NAME, length_limits.length_margins)
         patch.setattr(stages, WITNESS, second_witness.second_witness)
+        patch.setattr(compare, BOUND, bound_of_blocks)
         yield
