@@ -52,9 +52,12 @@ HEARD = frozenset({"test_compensation_points.py", "test_corrected_legs.py", "tes
 UNBOUNDED = UNHEARD | {TESTS / "postproc" / room for room in (
     "compile", "control", "feedrate", "job", "joints", "page", "pipeline", "python", "setup", "writing")}
 """rooms whose conversions are held to the tolerance at places alone: no test there looks at the bound between them"""
-BOUNDED = HEARD | {"test_cheap_bounds_read_back.py", "test_deviation_bound.py", "test_every_machine_and_control.py",
-                   "test_golden_programs.py", "test_own_kinds.py", "test_residuals.py", "test_whole_conversions.py",
-                   "test_worst_place.py"}
+BOUNDED = HEARD | {"test_align.py", "test_cheap_bounds_read_back.py", "test_cli.py", "test_compensation.py",
+                   "test_controller_rules.py", "test_deviation_bound.py", "test_deviations_and_rewinds.py",
+                   "test_every_machine_and_control.py", "test_golden_programs.py", "test_joint_samples.py",
+                   "test_machines_of_the_catalogue.py", "test_optimised.py", "test_orientation_proved.py",
+                   "test_own_kinds.py", "test_report_command.py", "test_residuals.py", "test_tip_programs_of_legs.py",
+                   "test_whole_conversions.py", "test_worst_place.py"}
 """files of these rooms that show it"""
 NAME, WITNESS, BOUND = "length_margins", "second_witness", "bound_of_blocks"
 DRAWN = frozenset({"test_drawing.py", "test_sheet.py", "test_run.py"})
