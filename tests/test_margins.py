@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from tests.margins import BOUNDED, TESTS, UNBOUNDED
+from tests.margins import BOUNDED, UNBOUNDED
 
 LOOKS = re.compile(r"comparison(?:\.|, \")(?:tip_bound|axis_bound|unbounded|bounded_cuts)|blocks_without_bound|"
                    r"worst_tip_deviation_mm|(?<!certificate\"\])(?<!found)\[\"proved\"\]|\"proved: tip|startswith\(\"proved")
