@@ -62,6 +62,8 @@ BOUNDED = HEARD | {"test_align.py", "test_cheap_bounds_read_back.py", "test_cli.
 NAME, WITNESS, BOUND = "length_margins", "second_witness", "bound_of_blocks"
 DRAWN = frozenset({"test_drawing.py", "test_sheet.py", "test_run.py"})
 """files that look at how drawings are laid out, and at the same bytes of processes of their own"""
+UNDRAWN = frozenset({TESTS / "hints", TESTS / "docs", TESTS / "postproc" / "dossier"})
+"""rooms that look at no picture: sheets are filled and written with their titles, panels are left out"""
 ROUGH = 40
 """dots per inch"""
 PLACES = 1000
@@ -75,6 +77,13 @@ def _none(*given: Any) -> tuple[()]:
 def _as_put(sheet: Any) -> None:
     """In the place of the layout that gives panels as much room as their texts need."""
     sheet.set_layout_engine("none")
+
+
+def _without_panels(sheet: Any) -> None:
+    """A sheet whose panels are not drawn."""
+    _as_put(sheet)
+    for panel in sheet.axes:
+        panel.set_visible(False)
 
 
 def _silent(*given: Any) -> tuple[Testimony, list[Any]]:
@@ -92,7 +101,7 @@ def lengths_looked_at_where_they_are_seen(request: pytest.FixtureRequest) -> Ite
     room, name = request.path.parent, request.path.name
     with pytest.MonkeyPatch.context() as patch:
         if name not in DRAWN:
-            patch.setattr(drawing, "_settle", _as_put)
+            patch.setattr(drawing, "_settle", _without_panels if room in UNDRAWN else _as_put)
             patch.setattr(drawing, "DOTS", ROUGH)
         patch.setattr(survey, "PLACES", PLACES)
         patch.setattr(exports, "WORST_PLACES", PLACES)
