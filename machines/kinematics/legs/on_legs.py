@@ -51,10 +51,6 @@ class OnLegs(RedundantLegs):
 
     jets_proved = True
 
-    def __post_init__(self) -> None:
-        if self.loops.rings is not None:  # their nearest points move on the platform
-            object.__setattr__(self, "jets_proved", False)
-
     @property
     def leg_geometry(self) -> LegGeometry:
         """See the base class."""
@@ -165,7 +161,7 @@ class OnLegs(RedundantLegs):
 
     def jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
         """See the base class."""
-        return by_parts(self._jets, q0, q1) if self.jets_proved else super().jets(q0, q1)
+        return by_parts(self._jets, q0, q1)
 
     def _jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
         middle, step = 0.5 * (q0 + q1), q1 - q0
