@@ -26,7 +26,7 @@ import numpy as np
 from machines.kinematics import columns
 from machines.kinematics.holds import Holds
 from machines.kinematics.legs.loops import Loops
-from machines.kinematics.legs.ring_ends import RingEnds
+from machines.kinematics.legs.ring_ends import EndsOnRings
 from machines.kinematics.rod_loops import UNBOUNDED
 from machines.kinematics.sliders import solved
 from machines.kinematics.taylor import TaylorAngle, TaylorVector
@@ -124,11 +124,11 @@ class MovingLoops:
         return self.loops.arms_at(self.place, self.turn)
 
     @cached_property
-    def _rings(self) -> RingEnds | None:
+    def _rings(self) -> EndsOnRings | None:
         if self.loops.rings is None:
             return None
         away = self.loops.drives.points - self.place[:, None]
-        return RingEnds(self.loops.rings, away, self.turn[:, :, 2], self.loops.arms(self.turn))
+        return EndsOnRings(self.loops.rings, away, self.turn[:, :, 2], self.loops.arms(self.turn))
 
     @cached_property
     def _rods(self) -> Floats:

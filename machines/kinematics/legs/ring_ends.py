@@ -28,7 +28,7 @@ from toolpaths.shapes import arrays
 
 @dataclass(frozen=True, eq=False)
 @arrays(radius="K", away="N K 3", axis="N 3", centre="N K 3")
-class RingEnds:
+class EndsOnRings:
     """Ends of K rods in the middle of N moves; all is 0 of rods that end on none.
 
     Attributes:

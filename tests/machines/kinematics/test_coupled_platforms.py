@@ -14,7 +14,7 @@ from machines.kinematics import by_samples
 from machines.kinematics.legs.attitudes import direction_of
 from machines.kinematics.legs.bounds import MovingLoops
 from machines.kinematics.legs.on_legs import OnLegs
-from machines.kinematics.legs.ring_ends import RingEnds
+from machines.kinematics.legs.ring_ends import EndsOnRings
 from machines.loader import load_checked
 from tests.source import ROOT
 from toolpaths.arrays import Floats
@@ -110,7 +110,7 @@ def test_ends_on_rings_go_round_no_faster_than_their_bounds() -> None:
     jets = MovingLoops(kin.loops, *middle[:2], q0 + 0.5 * step, step).jets()
     assert kin.loops.rings is not None
     away = kin.legs.points - middle[0][:, None]
-    rings = RingEnds(kin.loops.rings, away, middle[1][:, :, 2], kin.loops.arms(middle[1]))
+    rings = EndsOnRings(kin.loops.rings, away, middle[1][:, :, 2], kin.loops.arms(middle[1]))
     assert np.abs(rings.moved(jets.first) - middle[3]).max() < 1e-4 * np.abs(middle[3]).max()
     lever, longest = kin.loops.lever, lengths(away) + 12.0
     good = jets.third < 1e4
