@@ -121,8 +121,17 @@ def unit(v: Array) -> Array:
         return np.asarray(np.where(size > 0.0, v / size, np.nan))
 
 
+def picked(values: Array, index: Array) -> Array:
+    """Values (K, ...) by an index (N,); by one that is kept once, the value is."""
+    if len(index) and index.strides[0] == 0:
+        return np.broadcast_to(values[index[0]], (len(index), *values.shape[1:]))
+    return np.asarray(values[index])
+
+
 def loads(tool: Array) -> Array:
     """(N,) row at which the tool of each row was loaded."""
+    if len(tool) and tool.strides[0] == 0:
+        return np.broadcast_to(0, len(tool))
     return np.maximum.accumulate(np.where(np.diff(tool, prepend=tool[:1] - 1) != 0, np.arange(len(tool)), 0))
 
 
