@@ -240,8 +240,7 @@ def _case(source: ClSource, setup: SetupFile, options: Options, job: Job, compar
     control, words, curves = job.control_at(place), job.controller.codes, len(comparison.executed[0].curves) > 0
     errors = error_tables(options.error_model) if job.corrects and options.error_model else ({}, {})
     machine = _by_drives(job.machine)
-    text = source.data if source.plug_in is None else source.records
-    return Case(text, machine_tables(machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
+    return Case(lambda: source.text, machine_tables(machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
                 source.units or None, source.dialect or None, control.rapids == "dog-leg", comparison.planned, job.corrects,
                 *errors, "{register}" in words.length_offset, "{register}" in words.compensation_left,
                 sum(bit for bit, code in ((1, words.flood), (2, words.mist), (4, words.through), (8, words.air)) if code),

@@ -13,7 +13,8 @@ from postproc.witness.text import Array
 
 @dataclass(frozen=True)
 class Case:
-    """A conversion: bytes of the CL file and how it is to be read, machine file over its bases, set-up, tolerances.
+    """A conversion: the CL file, as a call that gives its bytes, and how it is to be read, machine file over its bases,
+    set-up, tolerances.
 
     Attributes:
         machine: the parsed file, then its base and that one's
@@ -30,7 +31,7 @@ class Case:
             the tip of a tool without length stands there, None where it has no such joints
     """
 
-    cl: bytes
+    cl: Callable[[], bytes]
     machine: list[dict[str, Any]]
     setup: dict[str, Any]
     tolerance: float

@@ -11,7 +11,7 @@ import numpy as np
 
 from postproc.witness.clamps import check_clamps, other_limits
 from postproc.witness.clfile import commanded
-from postproc.witness.commanded import LINE, RAPID, Commanded, tools_of, unit
+from postproc.witness.commanded import LINE, RAPID, Commanded, tools_of, unit, with_spindle
 from postproc.witness.errors import ErrorChain, error_chain
 from postproc.witness.evidence import Aspect, Case, Compared, ExecutedBlocks, Finding, NotCompared, Testimony
 from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged
@@ -19,7 +19,7 @@ from postproc.witness.motion import Walked, check_arcs, check_path
 from postproc.witness.place import CHUNK, Cut, Poses, Unplaced, cut_of, placement, zero_of
 from postproc.witness.sides import check_sides
 from postproc.witness.splines import check_curves
-from postproc.witness.states import check_feeds, check_holes, check_states, check_velocities, with_spindle
+from postproc.witness.states import check_feeds, check_holes, check_states, check_velocities
 from postproc.witness.stretches import BOTTOM, Targets, is_cut, matched, targets_of, turns_of
 from postproc.witness.text import Array
 from postproc.witness.turning import check_turning
@@ -34,7 +34,7 @@ def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
     """What this witness says of an executed program; it never raises for what it does not understand."""
     began = process_time()
     try:
-        c = with_spindle(commanded(case.cl, case.units, case.dialect, case.cl_lines), case.setup)
+        c = with_spindle(commanded(case.cl(), case.units, case.dialect, case.cl_lines), case.setup)
         place = placement(case.setup, c)
         c = c if case.chosen is None else _reoriented(c, case.chosen)
     except Unplaced as fault:

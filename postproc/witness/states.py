@@ -19,7 +19,9 @@ from postproc.witness.commanded import (
     UNKNOWN,
     Commanded,
     WitnessCycle,
+    feeds_of,
     loads,
+    registers_of,
     tools_of,
 )
 from postproc.witness.evidence import Aspect, Case, Finding, FindingCode, NotCompared
@@ -31,52 +33,13 @@ from postproc.witness.text import Array
 
 ALLOWED, VELOCITY = 1.005, 1.02
 """shares: of a feed, in each move and in all of one feed, besides rounding; of an axis's velocity, by rounded words"""
-_RETRACT = 12
-"""blocks behind the bottom of a hole in which the tool comes to its retract plane"""
 _State = Literal["length", "tool", "spindle", "speed", "coolant"]
 _STATES: dict[_State, tuple[FindingCode, Aspect]] = {
     "length": ("length", "length registers"), "tool": ("tool", "tools"), "spindle": ("spindle", "spindle states"),
     "speed": ("spindle", "spindle states"), "coolant": ("coolant", "coolant states")}
+_RETRACT = 12
+"""blocks behind the bottom of a hole in which the tool comes to its retract plane"""
 _PECKED, _FEED_OUT = ("DEEP", "BRKCHP"), ("BORE", "REAM", "TAP")
-
-
-def with_spindle(c: Commanded, setup: dict[str, Any]) -> Commanded:
-    """With the set-up's spindle where it counts: `[tools.N]` for a tool that no SPINDL record is for,
-    `[output]` where the spindle stands there too, either where no record at all states one, and the speed of
-    either where the file turns the spindle without one."""
-    output = (setup.get("output") or {}).get("spindle")
-    own = {int(n): t["spindle"] for n, t in (setup.get("tools") or {}).items() if (t or {}).get("spindle")}
-    if not len(c) or not (output or own):
-        return c
-    tool, silent = tools_of(c, setup), c.spindle == UNKNOWN
-    begin = loads(tool)
-    others = (c.turned < begin) | ((c.turned == begin) & (c.spindle == 0))
-    known = ~silent & (c.spindle != UNFOLLOWED)
-    spindle, rpm = c.spindle.copy(), c.rpm.copy()
-    for number in np.unique(tool).tolist():
-        wanted, here = own.get(number) or output, tool == number
-        if not wanted:
-            continue
-        none = here & known & np.isnan(c.rpm)
-        taken = here & (silent | (known & others & ((number in own) | (c.spindle == 0) | none)))
-        rpm[taken | none] = wanted["rpm"]
-        spindle[taken] = 1 if wanted["direction"] == "clockwise" else -1
-    return replace(c, spindle=spindle, rpm=rpm)
-
-
-def feeds_of(c: Commanded, setup: dict[str, Any], most: float) -> Array:
-    """(N,) mm/min that the CL file asks for at every position, but taps no more than `most`; NaN where it does not say."""
-    own = np.array([(x.feed, x.per_turn) for x in c.cycles] + [(math.nan, 0.0)], np.float64)
-    hole = c.cycle >= 0
-    feed = np.where(hole, own[c.cycle, 0], c.feed)
-    per_turn = np.where(hole, own[c.cycle, 1] > 0, c.per_turn)
-    tap = np.array([x.kind == "TAP" for x in c.cycles] + [False])[c.cycle]
-    default = (setup.get("output") or {}).get("feed")
-    if default:
-        feed = np.where(np.isnan(feed) & ~c.inverse & ~tap, float(default), feed)
-        per_turn = per_turn & ~(np.isnan(c.feed) & ~hole)
-    feed = np.where(per_turn, feed * c.rpm, np.where(c.inverse & ~hole, math.nan, feed))
-    return np.asarray(np.where(feed > np.where(tap, math.inf, most), most, feed))
 
 
 def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], match: Array) -> tuple[list[Finding], int]:
@@ -204,13 +167,13 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     cuts = (w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)
     rows = np.flatnonzero(w.inside & (w.code > 0) & cuts & (w.on_path() | w.gap | w.returns))
     tool = tools_of(c, case.setup)
-    asked, loaded = (tool, _coolants(c, case.setup)), loads(tool)
+    coolant, loaded = _coolants(c, case.setup), loads(tool)
     found, counts, silent = dict[_State, Finding](), dict[Aspect, int](), list[NotCompared]()
     for first in range(0, max(len(rows), 1), CHUNK):
         here = rows[first:first + CHUNK]
         row = w.targets.row[w.owner[here] - w.returns[here]]
-        checks, unstated = _states_of(w, c, case, here, row, *(one[row] for one in asked),
-                                      np.where(c.registered[row] >= loaded[row], c.register[row], OWN))
+        named = registers_of(c, loaded, row)
+        checks, unstated = _states_of(w, c, case, here, row, tool[row], coolant[row], named)
         for state, text, compared, is_, wanted, good in checks:
             bad = np.flatnonzero(compared & ~good)
             code, aspect = _STATES[state]
