@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import weakref
 
 LARGE = 4_000_000
 """bytes from which on they are put aside"""
@@ -15,6 +16,7 @@ class Aside:
         import tempfile  # which starting a command would wait for
 
         self._size, self._file = len(data), tempfile.TemporaryFile(buffering=0)  # noqa: SIM115  # open as long as this is
+        weakref.finalize(self, self._file.close)
         left = memoryview(data)
         while len(left):
             left = left[self._file.write(left):]
