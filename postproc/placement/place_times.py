@@ -294,9 +294,9 @@ def limit_of(made: Candidate) -> str:
 def limiting_times(cuts: Iterable[tuple[float, str]]) -> dict[str, float]:
     """Seconds by what limits them, of (seconds, `limit_of`) each; see `TimedPlace`."""
     times: dict[str, float] = {}
-    for seconds, name in cuts:
+    for spent, name in cuts:
         if name:
-            times[name] = times.get(name, 0.0) + seconds
+            times[name] = times.get(name, 0.0) + spent
     return times
 
 
