@@ -138,11 +138,10 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
         noted = [*(_of_model(header, job.errors, gcode, has_errors(noted)) if header.corrected is not None else
                    _uncorrected(header, job, motion, executed, comparison, gcode) if has_errors(noted) else []), *noted,
                  *_unmeasured(motion, executed, job, faults)]
-    noted = _converted_with(noted, header, job)
     if margins and not has_errors([*comparison.diagnostics]):
         trial = LengthTrial(whole, offsets, job)
         comparison = replace(comparison, lengths=length_margins(trial, motion, executed, comparison))
-    return comparison, [*diagnostics, *noted]
+    return comparison, [*diagnostics, *_converted_with(noted, header, job)]
 
 
 def _converted_with(found: list[Diagnostic], header: ProgramHeader, job: Job) -> list[Diagnostic]:
