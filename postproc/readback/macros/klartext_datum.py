@@ -20,6 +20,7 @@ from __future__ import annotations
 
 import math
 import re
+from typing import Literal
 
 from postproc.readback.macros.expressions import MacroFault, written
 
@@ -53,6 +54,9 @@ _POLE = re.compile(r"/?[ \t]*CC\b")
 _ABOUT = re.compile(r"/?[ \t]*(?:C|CP|LP)\b")
 
 
+DatumCycle = Literal["", "cycle 8", "cycle 10", "cycle 11"]
+
+
 class DatumShift:
     """Shifts in force, by axis, in units of the program.
 
@@ -72,7 +76,7 @@ class DatumShift:
         self.surface, self.pole = dict[str, float](), (dict[str, float](), 0.0, 1.0)
 
     @property
-    def cycle(self) -> str:
+    def cycle(self) -> DatumCycle:
         """The one in force that changes coordinates beyond a shift, "" for none."""
         return "cycle 8" if self.mirrored else "cycle 10" if self.angle else "cycle 11" if self.scale != 1.0 else ""
 
@@ -113,7 +117,7 @@ class DatumShift:
         self._alone(row, "cycle 11")
         self.scale = float(m[1])
 
-    def _alone(self, row: str, own: str) -> None:
+    def _alone(self, row: str, own: DatumCycle) -> None:
         """A cycle that turns or scales coordinates stands alone."""
         cycle = self.cycle if self.cycle != own else ""
         if under := self.other or cycle or ("R" + self.side if self.side != "0" else ""):
