@@ -138,10 +138,24 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
         noted = [*(_of_model(header, job.errors, gcode, has_errors(noted)) if header.corrected is not None else
                    _uncorrected(header, job, motion, executed, comparison, gcode) if has_errors(noted) else []), *noted,
                  *_unmeasured(motion, executed, job, faults)]
+    noted = _converted_with(noted, header, job)
     if margins and not has_errors([*comparison.diagnostics]):
         trial = LengthTrial(whole, offsets, job)
         comparison = replace(comparison, lengths=length_margins(trial, motion, executed, comparison))
     return comparison, [*diagnostics, *noted]
+
+
+def _converted_with(found: list[Diagnostic], header: ProgramHeader, job: Job) -> list[Diagnostic]:
+    """The same; the first error names the tolerances of the header where these allow more than is asked for here."""
+    options, errors = job.options, [k for k, d in enumerate(found) if d.severity is Severity.ERROR]
+    stated = (("tolerance", header.tolerance, options.tolerance),
+              ("axis-tolerance", header.axis_tolerance, options.axis_tolerance))
+    said = [f"--{name} {mine:g}" for name, mine, here in stated if mine > here * (1.0 + 1e-9)]
+    if not (said and errors and header.ours):
+        return found
+    k = errors[0]
+    hint = f"verify with {' '.join(said)}, which the program was converted with by its header"
+    return [*found[:k], replace(found[k], hint="; ".join(part for part in (found[k].hint, hint) if part)), *found[k + 1:]]
 
 
 def _axis_words(machine: Machine) -> tuple[str, ...]:
