@@ -109,8 +109,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     motion, found = run(code, machine.axis_names, offsets, gcode)
     faults = Faults(job.toolpath.file, gcode)
     unseen, alone = check_start(code, job, faults), check_length_alone(data, code, job, gcode)
-    whole = _asked_later(code, motion, job, offsets)
-    code = whole.without(_axis_words(machine))
+    code = (whole := _asked_later(code, motion, job, offsets)).without(_axis_words(machine))
     diagnostics += [_located(d, job.toolpath.file, of_cl) for d in found]
     if has_errors(diagnostics):
         return None, diagnostics
