@@ -22,7 +22,11 @@ _ALLOWED = {
     "string_pattern_mismatch": "text of the form {pattern}"}
 _NUMBER = re.compile(r"\s*[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?\s*$")
 _COMMA = re.compile(r"(?:^|[=\[,])\s*([-+]?\d+),(\d+)\s*(?:#.*)?$")
+_IN_TABLE = re.compile(r"=\s*([-+]?\d+),(\d+)\s*[,}]")
+_TEXT = re.compile(r""""[^"]*"|'[^']*'|#.*""")
+_SLIP = re.compile(r"(?<![\w.+-])([-+]?)(?:(\d+)\.|(\d*)\.(\d+)|(0\d+))(?![\w.:-])")
 POINT = "write a decimal point"
+DIGITS = "TOML has digits before and behind the decimal point, and no zeros in front"
 
 
 def allowed(kind: str, context: Mapping[str, Any]) -> str:
@@ -53,8 +57,19 @@ def advice(kind: str, value: object) -> str:
 
 def decimal_comma(line: str) -> str:
     """The number with a decimal comma at the end of a line that is no TOML; "" for none."""
-    found = _COMMA.search(line)
+    found = _COMMA.search(line) or _IN_TABLE.search(line)
     return f"{found[1]},{found[2]}" if found else ""
+
+
+def slips(line: str) -> list[tuple[str, str]]:
+    """Numbers of a line as programs for machines have them and TOML has not (`-381.`, `.5`, `007`), each as it is meant."""
+    found = []
+    for one in _SLIP.finditer(_TEXT.sub("", line)):
+        sign, whole, before, behind, padded = one.groups("")
+        number = f"{(whole or before or padded).lstrip('0') or '0'}" + ("" if padded else f".{behind or '0'}")
+        if sign + number != one[0]:
+            found.append((one[0], sign + number))
+    return found
 
 
 LISTED, NEAR = 40, 5

@@ -252,6 +252,9 @@ def as_text(result: PostResult, output: str, estimate: Estimate | None = None,
     if result.options.smooth:
         lines.append("--smooth: a control that rounds corners itself may take longer where points are moved; --optimise "
                      "moves them only where its time gets less")
+    if (units := result.controller.format.units) != result.toolpath.units:
+        lines.append(f"units: program in {units}, CL file in {result.toolpath.units}; [output] units of the set-up states "
+                     "those of the program")
     if result.toolpath.records.total:
         lines.append(f"read: {result.toolpath.records}")
     fallen_back = any(found.code == "output.next_mode" for found in result.diagnostics)
