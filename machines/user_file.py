@@ -20,7 +20,7 @@ from pydantic_core import ErrorDetails
 
 from machines.toml_lines import KEPT, SHORT, KeyPath, Values, dotted, own_copy, parsed, table_named
 from machines.user_model import SCHEMA_KEY, key_texts
-from machines.value_words import DIGITS, POINT, advice, allowed, decimal_comma, meant, nearest, nearest_word, slips
+from machines.value_words import POINT, advice, allowed, decimal_comma, meant, nearest, nearest_word, slips
 from toolpaths.cl.text.kinds_of_file import what_is
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
@@ -200,7 +200,8 @@ def _syntax(fault: tomllib.TOMLDecodeError, file: str, text: str, kind: str) -> 
                      hint=f"{POINT}: {number.replace(',', '.')}")
     if wrong := slips(there):
         return error("file.syntax", f"not a number of TOML: {', '.join(one for one, _ in wrong)}", file=file, lines=[line],
-                     hint=f"{DIGITS}: write {', '.join(meant for _, meant in wrong)}")
+                     hint="write digits before and behind the decimal point, and no zeros in front: "
+                     f"{', '.join(meant for _, meant in wrong)}")
     return error("file.syntax", f"not valid TOML: {what}", file=file, lines=[line], hint=_HOW)
 
 

@@ -26,7 +26,6 @@ _IN_TABLE = re.compile(r"=\s*([-+]?\d+),(\d+)\s*[,}]")
 _TEXT = re.compile(r""""[^"]*"|'[^']*'|#.*""")
 _SLIP = re.compile(r"(?<![\w.+-])([-+]?)(?:(\d+)\.|(\d*)\.(\d+)|(0\d+))(?![\w.:-])")
 POINT = "write a decimal point"
-DIGITS = "TOML has digits before and behind the decimal point, and no zeros in front"
 
 
 def allowed(kind: str, context: Mapping[str, Any]) -> str:
