@@ -24,6 +24,19 @@ def test_words_are_those_of_the_controller(column: int) -> None:
     assert len(words) > 10 and [word for word in words if word not in text] == []
 
 
+@pytest.mark.parametrize("column", range(1, 6))
+def test_every_word_names_its_page_or_is_assumed(column: int) -> None:
+    """Letters that the pages explain, a manual by its number, or that no page at hand says it."""
+    pages = "".join((ROOT / page).read_text("utf-8")
+                    for page in ("docs/reference/control-rules.md", "postproc/readback/SHARED.md"))
+    explained = set(re.findall(r"\b([FSTHN]\d?) =", pages))
+    cells = {row[0]: row[column] for row in FEATURES[1:] if row[column] not in ("-", "*shop*")}
+    said = {name: [*re.findall(r"[AB]-\d{5}EN?|\*assumed\*", cell),
+                   *(explained & set(re.sub(r"`[^`]*`|,", " ", cell).split()))]
+            for name, cell in cells.items()}
+    assert len(cells) > 15 and [name for name, pages in said.items() if not pages] == []
+
+
 def test_tests_are_there() -> None:
     named = [name for row in (*FEATURES[1:], *OPTIONS[1:]) for name in re.findall(r"`([^`]+)`", row[-1])]
     assert len(named) > 40 and [name for name in named if not (ROOT / "tests" / name).is_file()] == []

@@ -65,8 +65,9 @@ class Section:
         angles: the printed angles in degrees, in the order of the controller's convention
         rotary: words (degrees) where the rotary axes stand on entering, by letter
         place: number of the place whose work offset is in force
-        out: Z of a plane, mm, at which the spindle stands just below home without a tool length, above where the section
-            ends; NaN where the tool does not go home from there along Z of the plane
+        out: Z of a plane, mm, without a tool length, at which the length goes off where the section ends: just below home,
+            or, where the tool does not go home from there along Z of the plane, where it stands
+        into: Z of machine coordinates, mm, without a tool length, where the tool stands when a plane is entered from them
     """
 
     first: int
@@ -76,6 +77,7 @@ class Section:
     rotary: tuple[tuple[str, float], ...] = ()
     place: int = 0
     out: float = float("nan")
+    into: float = float("nan")
 
 
 @dataclass(frozen=True)

@@ -33,27 +33,27 @@ def sections_of(job: Job, moves: Moves, path: JointPath, new: Ints) -> tuple[Sec
         control, last = frame.control, result[-1] if result else None
         if last is None or (last.plane, last.law, last.place) != (control.plane, control.law, control.place):
             result.append(Section(int(at[k]), control.law, control.plane, frame.angles, frame.rotary, control.place))
-        if control.law == "tilted":
+        if control.law == "tilted" and "Z" in control.machine.axis_names:
             end = int(first[k + 1]) - 1 if k + 1 < len(first) else len(path) - 1
             result[-1] = replace(result[-1], out=_out(job, moves, path, end))
+            if last is not None and last.law == "axes":
+                result[-1] = replace(result[-1], into=_out(job, moves, path, int(first[k]) - 1))
     return tuple(result)
 
 
 def _out(job: Job, moves: Moves, path: JointPath, end: int) -> float:
     """`Section.out` of a section that ends with block `end`."""
     machine, letters = job.control.machine, job.control.machine.axis_names
-    axis = machine.retract_axis
-    if axis < 0 or end + 1 >= len(path) or not path.home[end + 1] or not path.state[end + 1, axis]:
-        return float("nan")
-    up = np.stack([path.q[end], path.q[end]])
-    up[1, axis] = machine.home[axis] - BELOW_HOME * np.sign(machine.home[axis] - path.q[end, axis])
-    tool, z = block_tools(path, moves), letters.index("Z")
+    axis, z, up = machine.retract_axis, letters.index("Z"), np.stack([path.q[end], path.q[end]])
+    homes = axis >= 0 and end + 1 < len(path) and bool(path.home[end + 1] and path.state[end + 1, axis])
+    if homes:
+        up[1, axis] = machine.home[axis] - BELOW_HOME * np.sign(machine.home[axis] - path.q[end, axis])
+    tool = block_tools(path, moves)
     below, above = unrounded_words(path, up, np.array([end, end]), tool, job.kinematics, job.offset_length)
     travel = np.abs(above - below)
     travel[z] -= abs(up[1, axis] - up[0, axis])
-    if not above[z] > below[z] or np.abs(travel).max() > float(job.grid.grain.min()):
-        return float("nan")
-    return float(above[z]) + job.offset_length(int(tool[end]))
+    rises = homes and above[z] > below[z] and np.abs(travel).max() <= float(job.grid.grain.min())
+    return float((above if rises else below)[z]) + job.offset_length(int(tool[end]))
 
 
 def with_sections(commands: Commands, sections: tuple[Section, ...], line: Ints) -> Commands:

@@ -14,7 +14,7 @@ from postproc.readback.comparison.tool_changes import AWAY
 from postproc.readback.comparison.unstated_codes import needs, unstated_between
 from postproc.readback.dialects.base import Reader, as_bytes
 from postproc.readback.execution.execute import Motion
-from postproc.readback.text.canonical import COOLANT, LOADED, REGISTER, Canonical
+from postproc.readback.text.canonical import COOLANT, LOADED, REGISTER, SMOOTH, Canonical
 from postproc.readback.text.modal import codes
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
@@ -77,11 +77,12 @@ def _restarts(code: Canonical, motion: Motion, job: Job, reader: Reader, operati
 def _unnamed(code: Canonical, motion: Motion, row: int, label: int) -> Iterator[str]:
     """What is in force in a row that cuts and is not stated from block `label` on: tool, spindle, coolant, smoothing."""
     words, block = code.words, int(motion.block[row])
-    units = codes(words, "G", (20, 21))[0]
     loaded, lengths, units = words.pick(LOADED)[0], words.pick(REGISTER)[0], codes(words, "G", (20, 21))[0]
+    smoothing = words.pick(SMOOTH)[0]
     stated = {"the units": units if len(units) else None,
               "the tool": loaded if motion.register[row] < 0 else np.concatenate([loaded, lengths]),
               "the spindle": codes(words, "M", (3, 4))[0] if motion.spindle[row] else None,
+              "the smoothing": smoothing if (smoothing <= block).any() else None,
               "the coolant": words.pick(COOLANT)[0] if motion.coolant[row] else None,
               "the feed": None if motion.hole[row] else words.pick("F")[0]}
     for what, blocks in stated.items():

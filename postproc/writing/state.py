@@ -110,11 +110,16 @@ class WriterState:
         return [mode for law, mode in modes.items() if mode is not None and law in laws]
 
     def length_alone(self) -> bool:
-        """True where a length register changes in a block that states no height: where a mode takes it, where a plane is
-        left elsewhere than on the path to home, or where the program has no block that goes home."""
-        modes = [(section, mode) for section in self.program.sections if (mode := self.mode_of(section)) is not None]
-        return any("{register}" in block for _, mode in modes for block in mode.enter) or any(
-            mode.length == "off" and math.isnan(section.out) for section, mode in modes)
+        """True where a length register changes in a block that states no height: where a mode takes it or ends it so, in a
+        safe start that does not go home, at a tool change away from home, and in blocks of G43 of their own."""
+        p, rules = self.program, self.controller.tools
+        modes = [(section, mode) for section in p.sections if (mode := self.mode_of(section)) is not None]
+        taken = any("{register}" in block for _, mode in modes for block in mode.enter)
+        alone = any(mode.length == "off" and math.isnan(section.out) for section, mode in modes)
+        start = not self.goes_home(0) and any(mode.lifted for _, mode in modes)
+        changes = [k for k, commands in p.commands.items() if any(c.name == "CHANGE_TOOL" for c in commands)]
+        away = not rules.length_with_z or any(k == 0 or not self.goes_home(k - 1) for k in changes)
+        return taken or alone or start or (self.length_offsets and away)
 
     def restate(self) -> None:
         """State motion code and feed with the next block."""
@@ -292,7 +297,7 @@ class WriterState:
         mode = self.mode_of(section)
         if mode is None:
             return
-        yield from self._length(mode.length)
+        yield from self._length(mode.length, section.into)
         values = self.section_values(section)
         for block in mode.enter:
             if "{register}" in block:
@@ -307,26 +312,29 @@ class WriterState:
         if mode is None:
             return
         holds = any("{register}" in block for block in mode.enter)
-        if not holds and not math.isnan(section.out) and mode.length == "off" and self.register and not self.length_off:
-            codes, (height,) = self.controller.codes, self.lengths(np.array([section.out]))
-            yield self.space.join((codes.traverse, codes.length_cancel, f"Z{height}"))
+        if holds:
             self.length_off = True
-        elif not holds:
-            yield from self._length(mode.length)
+        else:
+            yield from self._length(mode.length, section.out)
         for block in mode.leave:
             yield block.format(**self.section_values(section))
-        self.length_off |= holds
         self.restate()
 
-    def _length(self, wanted: LengthState) -> Iterator[str]:
-        """The length register off or on, where it is not."""
-        codes = self.controller.codes
+    def _length(self, wanted: LengthState, height: float) -> Iterator[str]:
+        """The length register off or on, where it is not; off in a block that states Z, the tool at `height` without it."""
         if wanted == "off" and self.register and not self.length_off:
-            yield codes.length_cancel
-            self.length_off = True
+            yield self.without_length(height)
         elif wanted == "on" and self.register and self.length_off:
-            yield codes.length_offset.format(register=self.register)
             self.length_off = False
+            yield self.controller.codes.length_offset.format(register=self.register)
+
+    def without_length(self, height: float = math.nan) -> str:
+        """The block that takes the length off: with the Z at which the tool then stands, so that it is right whether or not
+        the code moves by itself; alone where that is not known."""
+        codes, self.length_off = self.controller.codes, True
+        if math.isnan(height):
+            return codes.length_cancel
+        return self.space.join((codes.traverse, codes.length_cancel, f"Z{self.lengths(np.array([height]))[0]}"))
 
     @property
     def length_waits(self) -> bool:

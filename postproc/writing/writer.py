@@ -128,7 +128,7 @@ class Writer(WriterState, ABC):
             if self.goes_home(self.at):
                 self.waiting += mode.lifted
             elif mode.lifted:
-                yield from (self.controller.codes.length_cancel, *mode.lifted)
+                yield from (self.without_length(), *mode.lifted)
         yield from self.controller.rollover.on if self.program.rolls else ()
         if (self.program.plane[self.program.code == 2] > 17).any():
             yield from self.controller.arcs.start
@@ -385,11 +385,10 @@ class Writer(WriterState, ABC):
         """The tool change, with the length register off."""
         codes = self.controller.codes
         if self.length_offsets and codes.length_cancel and not self.length_off:
-            yield codes.length_cancel
+            yield self.without_length()
         yield from blocks_of(codes.tool_change.format(number=self.tool_said(number)))
         if self.controller.tools.length_automatic and not self.length_offsets and codes.length_cancel:
-            yield codes.length_cancel
-            self.length_off = True
+            yield self.without_length()
         self.motion, self.register = "", ""
 
     def use_length(self, register: str) -> Iterator[str]:

@@ -106,7 +106,8 @@ def test_the_work_offset_whose_rotary_values_must_be_zero_is_named(controller: s
 
 
 @pytest.mark.parametrize(("controller", "output", "words"), [
-    ("fanuc-30i", "tcp", "5006#6 tos"), ("haas-ngc", "tcp", "MRZP offsets"), ("siemens-840d", "auto", "swivel data set"),
+    ("fanuc-30i", "tcp", "5006#6 tos"), ("haas-ngc", "tcp", "MRZP offsets"), ("haas-ngc", "tcp", "G49 and G234"),
+    ("siemens-840d", "auto", "swivel data set"),
     ("heidenhain-tnc640", "tcp", "rotary values of 0")])
 def test_each_setting_is_confirmed_by_itself(controller: str, output: str, words: str) -> None:
     """The header leaves out what the machine file confirms, and nothing else; the words are the same."""

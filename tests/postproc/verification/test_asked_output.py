@@ -60,7 +60,9 @@ def test_a_program_that_ignores_a_key_of_its_form_is_found(controller: str, mach
 
 @pytest.mark.parametrize(("controller", "word", "says"), [
     ("fanuc-30i", "G54", "work offset"), ("fanuc-30i", "G21 ", "units"), ("linuxcnc", "G17 ", "G17"),
-    ("siemens-840d", "G54", "work offset"), ("heidenhain-tnc640", "Q339", "preset")])
+    ("fanuc-30i", "G05.1 Q1", "smoothing"), ("haas-ngc", "G187 P3 E0.003", "smoothing"),
+    ("linuxcnc", "G64 P0.002 Q0.001", "smoothing"), ("siemens-840d", "G54", "work offset"),
+    ("heidenhain-tnc640", "Q339", "preset")])
 def test_each_state_that_an_operation_does_not_restate_is_named(controller: str, word: str, says: str) -> None:
     """The last of its kind, which stands behind the start of the second operation, left out."""
     result = made(controller, "mill-3axis", "[output]\nrestart = true\n")

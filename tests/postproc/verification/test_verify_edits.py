@@ -118,7 +118,7 @@ def test_tools_change_at_home_with_spindle_and_coolant_off(controller: str) -> N
 
 
 @pytest.mark.parametrize(("at", "severity"), [(0, Severity.WARNING), (1, Severity.ERROR)])
-@pytest.mark.parametrize("controller", ["fanuc-30i", "generic-iso"])
+@pytest.mark.parametrize("controller", ["fanuc-30i", "haas-ngc", "generic-iso"])
 def test_a_length_cancelled_before_home_asks_for_the_setting(controller: str, at: int, severity: Severity) -> None:
     """The block that goes home before a tool change cancels the length (at 0 nobody knows whether one is in force); before
     it the tool may move down by the length. The machine file, or the header of the program, may say that it does not."""

@@ -18,7 +18,7 @@ from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile
 from postproc.verification.read_back import read_back
 from tests.postproc.control.test_clamps import CONTROLS, SETUP, indexed
-from tests.postproc.kit import setup_of, toolpath
+from tests.postproc.kit import setup_of, toolpath, words_of
 from toolpaths.diagnostics import Severity
 
 OFF_AXIS = "[part]\norigin = [31, -12, 5]\n[tools.1]\ngauge_length = 90\n[tools.2]\ngauge_length = 65\n"
@@ -175,9 +175,16 @@ def test_a_plane_is_stated_at_home_on_travel_from_home(index: str) -> None:
         above = "G43" in block or (above and not block.startswith("G53 G0 "))
     planes = sum(block.startswith("G68.2") for block in blocks)
     assert planes > 3 and cancelled == (0 if index == "home" else 1)  # the mode by the tip goes by home all the same
-    alone = [blocks[k - 1] for k, block in enumerate(blocks) if block == "G69" and k and blocks[k - 1] == "G49"]
-    assert len(alone) == (0 if index == "home" else 1)
-    assert ("5006#6 TOS" in result.text) == (index == "plane" or "G43.4" in result.text)
+    assert ("5006#6 TOS" in result.text) == ("G49" in blocks) == ("G43.4" in result.text)
+    height, length, moved = 0.0, 0.0, list[float]()
+    for block in blocks:  # where the length goes off the tool stays, or rises along Z: right however 5006#6 TOS is set
+        words = words_of(block.partition("(")[0])
+        length = at_home(index).tools[words["H"]].gauge_length if "H" in words else length
+        if block.startswith("G0 G49"):
+            moved.append(float(words["Z"]) - height - length)
+        height = float(words.get("Z", height))
+    assert len(moved) >= 4 and all(abs(mm) < 1.1e-4 or mm > 1.0 for mm in moved)
+    assert (min(map(abs, moved)) < 1.1e-4) == (index == "plane")
 
 
 @pytest.mark.covering
