@@ -12,15 +12,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import field, replace
 from functools import lru_cache
 from pathlib import Path as FilePath
-from types import UnionType
-from typing import Annotated, Any, TypeVar, Union, get_args, get_origin
+from typing import Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from machines.toml_lines import KEPT, SHORT, KeyPath, Values, dotted, own_copy, parsed, table_named
 from machines.user_model import SCHEMA_KEY, key_texts
-from machines.value_words import POINT, advice, allowed, decimal_comma, meant, nearest, nearest_word, slips
+from machines.value_words import POINT, advice, allowed, as_in_programs, decimal_comma, in_dots, meant, nearest, nearest_word
 from toolpaths.cl.text.kinds_of_file import what_is
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
@@ -203,7 +202,7 @@ def _syntax(fault: tomllib.TOMLDecodeError, file: str, text: str, kind: str) -> 
     if number := decimal_comma(there):
         return error("file.syntax", f"{number} is not a number", file=file, lines=[line],
                      hint=f"{POINT}: {number.replace(',', '.')}")
-    if wrong := slips(there):
+    if wrong := as_in_programs(there):
         return error("file.syntax", f"not a number of TOML: {', '.join(one for one, _ in wrong)}", file=file, lines=[line],
                      hint="write digits before and behind the decimal point, and no zeros in front: "
                      f"{', '.join(meant for _, meant in wrong)}")
@@ -331,19 +330,12 @@ def _added(model: type[BaseModel], path: KeyPath) -> str:
                          (f"[{name}.NAME]", _elements(kinds, (dict, Mapping)))):
         models = [one for kind in inside for one in _models(kind)]
         keys = sorted({field.alias or key for one in models for key, field in one.model_fields.items()})
-        needed = [f"{key} = {_shape(_kinds(one, (key,)))}" for key in keys for one in models[:1] if all(
+        needed = [f"{key} = {in_dots(_kinds(one, (key,)))}" for key in keys for one in models[:1] if all(
             field.is_required() for m in models for k, field in m.model_fields.items() if key in (k, field.alias))]
         if needed or (models and form != f"[{name}]"):
             return f"add a table {form}" + (f" with {', '.join(needed)}" if needed else "")
     where = f"to {table_named(path[:-1])}" if path[1:] else "at the top"
-    return f"add {path[-1]} = {_shape(kinds)} {where}"
-
-
-def _shape(kinds: list[Any]) -> str:
-    """How values of these types begin: those of lists in brackets."""
-    wrapped = (Annotated, Union, UnionType)
-    parts = [part for kind in kinds for part in (get_args(kind) if get_origin(kind) in wrapped else [kind])]
-    return "[...]" if any(get_origin(part) in (list, tuple) for part in parts) else "..."
+    return f"add {path[-1]} = {in_dots(kinds)} {where}"
 
 
 def _elements(kinds: list[Any], of: tuple[Any, ...]) -> list[Any]:

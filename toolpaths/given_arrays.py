@@ -12,8 +12,6 @@ from toolpaths.arrays import Array, Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic, DiagnosticError, error
 
 Listed = TypeVar("Listed")
-SHOWN = 60
-"""characters of a value that a message shows"""
 CLOSE = 0.01
 """mm that the begin and the end of an arc may be off its circle"""
 
@@ -96,14 +94,6 @@ def _numbers(values: npt.ArrayLike) -> Floats:
     if isinstance(a, np.ma.MaskedArray):
         return np.where(np.ma.getmaskarray(a), np.nan, np.ma.getdata(a).astype(np.float64))
     return np.asarray(a, np.float64)
-
-
-def value_shown(value: object) -> str:
-    """What was given in the place of one value: in full where that is short, of arrays their type and shape alone."""
-    if isinstance(value, np.ndarray) and value.ndim:
-        return f"an array of {value.dtype}, shape {value.shape}"
-    text = repr(value)
-    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."
 
 
 def _shown(values: npt.ArrayLike) -> str:

@@ -13,8 +13,8 @@ from toolpaths.arrays import Array, Floats, Ints, shared
 from toolpaths.aside import Aside
 from toolpaths.choices import CycleKind, GivenDialect, GivenUnit, LengthUnit
 from toolpaths.dataclass import dataclass
-from toolpaths.diagnostics import Diagnostic
-from toolpaths.given_arrays import CLOSE, GivenArrays, given_rows, off_circle, passes, unit_rows, value_shown
+from toolpaths.diagnostics import Diagnostic, value_shown
+from toolpaths.given_arrays import CLOSE, GivenArrays, given_rows, off_circle, passes, unit_rows
 from toolpaths.plug_ins import PlugIn
 from toolpaths.shapes import arrays
 

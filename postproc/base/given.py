@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import SupportsFloat
 
-from toolpaths.diagnostics import Diagnostic, error
-from toolpaths.given_arrays import value_shown
+from toolpaths.diagnostics import Diagnostic, error, value_shown
 
 
 def wrong(message: str, remedy: str) -> Diagnostic:

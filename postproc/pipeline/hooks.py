@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from functools import cache
-from typing import Any
 
 from machines.hooks import HOOK_VALUES, NAMES, filled
 from machines.loader import builtin
@@ -161,7 +160,7 @@ def _in_file(file: str, key: KeyPath, entry: str) -> tuple[str, list[int]]:
     values = read_toml(file, {**builtin(), **builtin_files()})[0] if file else None
     if values is None:
         return file, []
-    held: Any = values.values
+    held: object = values.values
     for part in key:
         held = held.get(part, {}) if isinstance(held, dict) else {}
     origin = values.origin((*key, held.index(entry)) if isinstance(held, list) and entry in held else key)

@@ -27,8 +27,7 @@ from postproc.python.conversion import convert
 from postproc.setup.model import SetupFile, alone, load_setup
 from postproc.verification.neighbour_files import NeighbourFiles
 from toolpaths.cl.text.kinds_of_file import looks_like_apt
-from toolpaths.diagnostics import DiagnosticError, error, read_value, require
-from toolpaths.given_arrays import value_shown
+from toolpaths.diagnostics import DiagnosticError, error, read_value, require, value_shown
 from toolpaths.toolpath import Toolpath
 
 FileName = str | Path
