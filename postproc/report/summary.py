@@ -299,8 +299,8 @@ def as_text(result: PostResult, output: str, estimate: Estimate | None = None,
 def _other_units(result: PostResult) -> list[str]:
     """That the program is in other units than its CL file, where it is."""
     units, read = result.controller.format.units, result.toolpath.units
-    return [] if units == read else [f"units: program in {units}, CL file in {read}; [output] units of the set-up states those "
-                                     "of the program"]
+    said = f"units: program in {units}, CL file in {read}; [output] units of the set-up states those of the program"
+    return [] if units == read else [said]
 
 
 def verify_dict(result: VerifyResult) -> dict[str, Any]:
