@@ -84,8 +84,9 @@ def check_safe_planes(motion: Motion, executed: BlockPoses, job: Job, home: Floa
     key, share = ("margin", MARGINS[-1]) if asked.distance is None else ("distance", 1.0)
     says = f"{least_room:.3f} mm above" if least_room > 0.0 else f"{-least_room:.3f} mm below the top of"
     lower = f", or write {key} = {math.floor(10.0 * least_room / share) / 10.0:g} under [clearance] of the set-up"
-    return [faults.warning("verify.safe_plane", f"a linking move goes aside {says} the part, the safe plane is {least:g} mm above "
-                           "it", 0, line, len(low), "let it rise there first" + (lower if least_room >= LOWEST else ""))]
+    return [faults.warning("verify.safe_plane", f"a linking move goes aside {says} the part, the safe plane is {least:g} mm "
+                           "above it", 0, line, len(low),
+                           "let it rise there first" + (lower if least_room >= LOWEST else ""))]
 
 
 def _aside(tip: Floats, lines: list[tuple[Floats, Floats, Bools]], near: Floats) -> Bools:
