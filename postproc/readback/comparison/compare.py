@@ -54,7 +54,7 @@ from toolpaths.units import DEG
 @dataclass(frozen=True)
 @arrays(tip="E 3", axis="E 3", match="M", owner="E")
 class Comparison:
-    """Worst deviations (mm, rad) with the CL line and program line of each, and the poses and matching they rest on.
+    """Worst deviations (mm, rad), the CL line and program line of each, the poses and matching they rest on.
 
     Attributes:
         moves: those of the CL file, rapids split as the program splits them; `match` and `owner` count them without pecks
@@ -256,26 +256,22 @@ def _known_limits(most: Floats, arc: Bools, tolerance: float) -> Floats:
 
 def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: Lost, ends: tuple[Floats, Floats],
                  allowed: tuple[float, float], faults: Faults) -> Diagnostic:
-    """No block ends at a point of the CL file; or the one that stands for it has its tip there, and not its axis."""
-    x, y, z = moves.tip[lost.move]
-    at = int(match[lost.move - 1]) if lost.move else 0
-    there = at + np.flatnonzero(lengths(ends[0][at:] - moves.tip[lost.move]) <= allowed[0]) if lost.block < 0 else np.array(
-        [lost.block])
-    off = lengths(ends[0][there] - moves.tip[lost.move])
-    tilted = angle_between(ends[1][there], np.tile(moves.axis[lost.move], (len(there), 1)))
-    row = int(tilted.argmin()) if len(there) else -1
+    """No block ends at a point; or the one that stands for it has its tip there, and not its axis."""
+    x, y, z = point = moves.tip[lost.move]
+    at, line = int(match[lost.move - 1]) if lost.move else 0, int(moves.line[lost.move])
+    near = at + np.flatnonzero(lengths(ends[0][at:] - point) <= allowed[0]) if lost.block < 0 else np.array([lost.block])
+    off, tilted = lengths(ends[0][near] - point), angle_between(ends[1][near], moves.axis[np.full(len(near), lost.move)])
+    row = int(tilted.argmin()) if len(near) else -1
     if row >= 0 and tilted[row] > allowed[1] and off[row] <= allowed[0]:
         return faults.error("verify.axis", f"the program comes to the point ({x:.4f}, {y:.4f}, {z:.4f}) mm of the table "
                             f"frame with a tool axis that is off by {tilted[row] / DEG:.6f} degrees, allowed "
-                            f"{allowed[1] / DEG:g} degrees", int(moves.line[lost.move]), int(motion.line[there[row]]),
-                            hint="do not run this program")
-    says = f"the program never comes to the point ({x:.4f}, {y:.4f}, {z:.4f}) mm of the table frame"
-    line, hint = int(motion.line[at]), "a block behind this line is missing or wrong"
+                            f"{allowed[1] / DEG:g} degrees", line, int(motion.line[near[row]]), 1, "do not run this program")
+    says, hint = f"the program never comes to the point ({x:.4f}, {y:.4f}, {z:.4f}) mm of the table frame", "a block behind"
     if lost.block >= 0:
         says += f": this block, in its place, ends {off[0]:.6f} mm and {tilted[0] / DEG:.6f} degrees off"
-        line, hint = int(motion.line[lost.block]), "this block, or one before it, is wrong"
-    return faults.error("verify.not_reached", says, int(moves.line[lost.move]), line, hint=f"{hint}, or the program is not "
-                        "made from this CL file with this machine, set-up and tools")
+        at, hint = lost.block, "a block at or before"
+    return faults.error("verify.not_reached", says, line, int(motion.line[at]), 1, f"{hint} this line is missing "
+                        "or wrong, or the program is not made from this CL file with this machine, set-up and tools")
 
 
 def bound_of_blocks(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, allowed: tuple[float, float],
