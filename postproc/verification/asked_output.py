@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -58,7 +59,7 @@ def _restarts(code: Canonical, motion: Motion, job: Job, reader: Reader, operati
     needed = list(needs(code, reader))
     machine = np.isin(motion.block, codes(code.words, "G", (53,))[0])
     begins = np.flatnonzero(np.diff(operation, prepend=operation[:1]) != 0)
-    for a, b in zip(begins, [*begins[1:], len(operation)], strict=True):
+    for a, b in pairwise([*begins.tolist(), len(operation)]):
         cuts = a + np.flatnonzero(cut[a:b])
         if operation[a] < 0 or not len(cuts):
             continue

@@ -103,3 +103,13 @@ def test_axes_and_clamps_that_an_operation_leaves_as_they_are_are_named(old: str
     assert old in second
     noted = [d for d in found(turning(), f"{head}(TWO){second.replace(old, new, 1)}") if d.severity is Severity.ERROR]
     assert [d.code for d in noted] == ["verify.asked"] and says in noted[0].message and "TWO" in noted[0].message
+
+
+def test_a_block_left_out_of_the_first_operation_is_no_fault_of_ours() -> None:
+    """Where the motion behind it serves no operation that is known, nothing is said of taking it up."""
+    result = made("fanuc-30i", "mill-3axis", "[output]\nrestart = true\n")
+    head, _, text = result.text.partition("T1 M6\n")
+    first = text.partition("(OP1)")[0].splitlines(keepends=True)
+    for block in ("T1 M6\n", *first[1:6]):
+        left = (head + "T1 M6\n" + text).replace(block, "", 1)
+        assert any(d.severity is Severity.ERROR for d in found(result, left)) or block.startswith("G0"), block
