@@ -12,7 +12,7 @@ from machines.key_problem import KeyProblem
 from machines.kinematics.chain import Joint
 from machines.machine import Machine
 from machines.toml_lines import KeyPath
-from toolpaths.arrays import Bools
+from toolpaths.arrays import Bools, Floats
 from toolpaths.dataclass import dataclass
 from toolpaths.units import DEG, MM_PER_INCH
 
@@ -50,6 +50,8 @@ SLOWEST_TURN, FASTEST_MILLING = 30.0, 1200.0
 milling turns at most, as which one for turning counts"""
 TILT = 900.0
 """deg/s of a rotary axis with ends"""
+PLACES, ROUNDING = (3, 3, 3, 3), 1e-6
+"""of a workspace, along x, y, z and its tilt, at which travel is looked at; mm (rad) that is no distance from it"""
 END, MIDDLE = 0.12, 0.15
 """shares of a travel: next to its end, and around its middle"""
 _HINTS: dict[MotionOrder, str] = {
@@ -67,6 +69,7 @@ def implausible(machine: Machine) -> Iterator[KeyProblem]:
     unlike = list(_unlike(machine, {one.path for one in own}))
     yield from unlike
     yield from _pivots(machine, {one.path for one in (*own, *unlike)})
+    yield from _platform(machine)
 
 
 def odd_limits(machine: Machine) -> Iterator[KeyProblem]:
@@ -310,3 +313,42 @@ def _head_pivot(joint: Joint) -> Iterator[KeyProblem]:
         says = f"{joint.name} turns about a line {away:g} mm away from the gauge point, at most {HEAD:g} mm"
         yield KeyProblem("machine.plausible", path, says,
                          "measure it from the gauge point of the spindle, not from the machine's zero")
+
+
+def _platform(machine: Machine) -> Iterator[KeyProblem]:
+    """Of a machine on legs: home lies in the workspace, and travel holds it."""
+    from machines.analysis.limits_of_box import drives
+    from machines.reach import reach
+
+    over = machine.kinematics.over_workspace
+    if over is None:
+        return
+    place, tilt = over.workspace.grid(PLACES)
+    places = np.vstack([[*over.workspace.middle, np.clip(0.0, *over.workspace.tilt)], np.column_stack([place, tilt])])
+    q = over.joints_at(places, np.zeros((len(places), len(machine.axis_names) - drives(machine))))
+    margins, names = reach(machine.kinematics, machine.home[None]), machine.axis_names
+    faces = [(name, value) for name, value, own in zip(margins.names, margins.values[0], margins.of_box, strict=True)
+             if own and value < 0.0]
+    if faces:
+        at = ", ".join(f"{name} {_shown(machine, j, q[0, j])}" for j, name in enumerate(names) if np.isfinite(q[0, j]))
+        says = "home is outside the workspace: " + ", ".join(f"{name} by {-value:g}" for name, value in faces)
+        yield KeyProblem("machine.plausible", ("axes", names[0], "home"), says, f"the middle of the workspace is at {at}")
+    low, high = machine.limits.lower, machine.limits.upper
+    beyond = np.nan_to_num(np.maximum(low - q, q - high), nan=0.0)
+    if beyond.max() > ROUNDING:
+        worst, j = (int(k) for k in np.unravel_index(int(beyond.argmax()), beyond.shape))
+        ends = f"{_shown(machine, j, low[j])} to {_shown(machine, j, high[j])}"
+        at = "x {:g}, y {:g}, z {:g} mm".format(*places[worst, :3])
+        says = (f"at {at} of the workspace {names[j]} stands at {_shown(machine, j, q[worst, j])}, its travel is {ends}: "
+                f"{int((beyond.max(axis=1) > ROUNDING).sum())} of {len(q)} places looked at are outside of travel")
+        spans = ", ".join(_span(machine, k, q[:, k]) for k in range(len(names)) if beyond[:, k].max() > ROUNDING)
+        yield KeyProblem("machine.plausible", ("axes", names[j], "travel"), says, f"the workspace takes {spans}")
+
+
+def _span(machine: Machine, j: int, q: Floats) -> str:
+    scale, unit = (DEG, "deg") if machine.rotary[j] else (1.0, "mm")
+    return f"{machine.axis_names[j]} {np.floor(np.nanmin(q) / scale):g} {unit} to {np.ceil(np.nanmax(q) / scale):g} {unit}"
+
+
+def _shown(machine: Machine, j: int, value: float) -> str:
+    return f"{value / DEG:.4g} deg" if machine.rotary[j] else f"{value:.6g} mm"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from functools import lru_cache
 from pathlib import Path as FilePath
 from typing import Any, TypeVar, get_args, get_origin
@@ -48,6 +48,8 @@ class UserFile:
     values: Values
     origins: Mapping[KeyPath, ValueSource]
     """by path of keys, e.g. ("axes", "X", "travel")"""
+    shipped: Mapping[str, ValueSource] = field(default_factory=dict)
+    """built-in files among its bases, and where each is named: what a value of theirs lacks is the doing of what differs"""
 
     def origin(self, path: Sequence[str | int]) -> ValueSource:
         """Where the value at `path` was written, or the nearest table around it."""
@@ -58,8 +60,11 @@ class UserFile:
         return ValueSource(self.file, 1)
 
     def problem(self, code: str, path: Sequence[str | int], message: str, hint: str = "") -> Diagnostic:
-        """An ERROR at the line where `path` was written."""
+        """An ERROR at the line where `path` was written; of a value of a built-in base at the line that names the base."""
         origin = self.origin(path)
+        if origin.file in self.shipped:
+            message += f" ({dotted(path)} is that of base {FilePath(origin.file).stem}, line {origin.line})"
+            origin = self.shipped[origin.file]
         return error(code, message, file=origin.file, lines=[origin.line], hint=hint)
 
 
@@ -212,7 +217,8 @@ def _with_base(file: UserFile, builtin: Mapping[str, FilePath], kind: str,
         return None, diagnostics
     own = {k: v for k, v in file.values.items() if k != "base"}
     values, origins = _merge(under.values, own, under.origins, file.origins, ())
-    return UserFile(file.name, file.file, values, origins), diagnostics
+    shipped = {**under.shipped, **({under.file: file.origin(("base",))} if base in builtin else {})}
+    return UserFile(file.name, file.file, values, origins, shipped), diagnostics
 
 
 def _merge(under: Values, over: Values, under_at: Mapping[KeyPath, ValueSource], over_at: Mapping[KeyPath, ValueSource],

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from toolpaths.arrays import Array, Floats, Ints, shared
+from toolpaths.aside import Aside
 from toolpaths.choices import CycleKind, GivenDialect, GivenUnit, LengthUnit
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic
@@ -177,18 +178,28 @@ _SHARED = ("tip", "axis", "feed", "feed_mode", "kind", "role", "arc", "cycle", "
 
 @dataclass(frozen=True)
 class ClSource:
-    """The bytes of the CL file that a path was read from, and with which units and dialect ("": as the file says).
+    """The CL file that a path was read from (`data`: its bytes), and with which units and dialect ("": as the file says).
 
     Where a plug-in reads the file: which, the records that it makes of it, as APT text, and the line of the file by record
     (None where the text stands line for line).
     """
 
-    data: bytes
+    held: bytes | Aside
     units: GivenUnit = ""
     dialect: GivenDialect = ""
     plug_in: PlugIn | None = None
     records: bytes = b""
     lines: tuple[int, ...] | None = None
+
+    @property
+    def data(self) -> bytes:
+        """The bytes of the file, read again where they are on disk."""
+        return self.held if isinstance(self.held, bytes) else self.held.data()
+
+    @property
+    def text(self) -> bytes:
+        """What the file says as text that needs no plug-in."""
+        return self.data if self.plug_in is None else self.records
 
 
 @dataclass(frozen=True)

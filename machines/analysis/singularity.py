@@ -51,8 +51,12 @@ def grid_step_that_proves(kinematics: RodPlatform, floor: float, alpha: float = 
 
     III.7.3: around a grid point whose value is s the values stay above `floor` within safe_radius x (s - floor). The
     step is halved until half of its diagonal is inside that at every point; half a step also stays below `alpha`.
+    Where a rod reaches no further than joint and slide stand apart at their widest, A has no bound and nothing is proved.
     """
-    factor = safe_radius(_spread(kinematics), float(kinematics.legs.lengths.min()), alpha)
+    spread, length = _spread(kinematics), float(kinematics.legs.lengths.min())
+    if spread >= length:
+        return None
+    factor = safe_radius(spread, length, alpha)
     step = alpha
     while step >= FINEST:
         if 0.5 * math.sqrt(2.0) * step < factor * (_least(kinematics, step) - floor):

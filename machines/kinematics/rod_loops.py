@@ -20,21 +20,21 @@ from toolpaths.shapes import arrays
 
 _ROUNDS = 6
 _GROWTH = 1.02
-_PARTS = 4
+_PARTS, _AGAIN = 4, 2
 UNBOUNDED = 1e30
 """a third derivative for which no bound was found"""
 Jets = tuple[TaylorVector, TaylorVector]
 
 
-def by_parts(jets: Callable[[Floats, Floats], Jets], q0: Floats, q1: Floats) -> Jets:
+def by_parts(jets: Callable[[Floats, Floats], Jets], q0: Floats, q1: Floats, again: int = _AGAIN) -> Jets:
     """`jets` of the moves q0 -> q1 (N, J); where a whole move is too long for a bound, the largest of the
-    bounds of its parts, each over a shorter time."""
+    bounds of its parts, each over a shorter time, and these by parts `again`."""
     whole = jets(q0, q1)
     third = [np.array(np.broadcast_to(jet.third, len(q0)), dtype=np.float64) for jet in whole]
-    rows = np.flatnonzero(np.maximum(*third) >= UNBOUNDED)
-    if len(rows):
+    rows = np.flatnonzero((np.maximum(*third) >= UNBOUNDED) & np.isfinite(q0).all(axis=1) & np.isfinite(q1).all(axis=1))
+    if len(rows) and again:
         cuts = [q0[rows] + k / _PARTS * (q1[rows] - q0[rows]) for k in range(_PARTS + 1)]
-        parts = jets(np.concatenate(cuts[:-1]), np.concatenate(cuts[1:]))
+        parts = by_parts(jets, np.concatenate(cuts[:-1]), np.concatenate(cuts[1:]), again - 1)
         for column, jet in zip(third, parts, strict=True):
             most = np.broadcast_to(jet.third, len(rows) * _PARTS).reshape(_PARTS, -1).max(axis=0)
             column[rows] = np.minimum(most * _PARTS**3, UNBOUNDED)

@@ -121,6 +121,7 @@ class ProgramHeader:
         axes: None where those of the CL file are kept
         setup: None where it names none
         tolerance: mm that the program was converted with, 0 where none is stated
+        axis_tolerance: degrees, the same of the tool axis
         planned: True where its feeds were planned
         feeds: fingerprint of its F words, "" where none is stated
         hooks: name of the file of the shop's own blocks, "" where none is named
@@ -138,6 +139,7 @@ class ProgramHeader:
     feeds: str
     hooks: str = ""
     smoothing: float = 0.0
+    axis_tolerance: float = 0.0
 
 
 _GAP = rb"(?:[ \t]+|[ \t]*\)?[ \t]*\n[ \t]*(?:N?\d+[ \t]*)?[(;][ \t]*)"
@@ -167,6 +169,8 @@ _HOOKS = pattern(_BEGINS + _spaced(HOOKS) + _GAP + rb"([^\n]*)")
 _SETUP = pattern(rb"(?im)^[ \t(;\dN]*setup ([^\n]*?)(?:, " + SETUP_MARK.encode("ascii") + rb" ([0-9a-f]{8})\b|$)")
 _OURS = pattern(rb"(?im)^[^\n]*postproc \d+\.\d[^\n]*\n(?:[^\n]*part [^\n]*\n)?[^\n]*source ")
 _TOLERANCE = pattern(rb"(?im)^[ \t(;\dN]*tolerance (\d[\d.e-]*) (mm|inch)\b")
+_AXIS_TOLERANCE = pattern(_BEGINS + rb"tolerance [^\n]*," + _GAP + _spaced("axis tolerance") + _GAP + rb"(\d[\d.e-]*)"
+                          + _GAP + rb"degrees\b")
 _SMOOTHING = pattern(rb"(?im)^[ \t(;\dN]*control.{0,3}s smoothing (\d[\d.e-]*) (mm|inch)\b")
 _PLANNED = pattern(rb"(?im)^[ \t(;\d]*feed planned")
 _FEEDS = pattern(rb"(?im)^[^\n]*" + FEEDS.encode("ascii") + rb" ([0-9a-f]{8})\b")
@@ -180,7 +184,7 @@ def read_header(data: bytes) -> ProgramHeader:
     by_control = _BY_CONTROL.search(header) or _BY_CONTROL_FOLDED.search(header)
     named = _CORRECTED.search(header) or (None if by_control else _CORRECTED_FOLDED.search(header))
     hooks = _HOOKS.search(header)
-    tolerance, smoothing = _TOLERANCE.search(header), _SMOOTHING.search(header)
+    tolerance, smoothing, axis = _TOLERANCE.search(header), _SMOOTHING.search(header), _AXIS_TOLERANCE.search(header)
     marks = [found[1].decode("ascii").lower() if (found := mark.search(header)) else "" for mark in (_MODEL, _FEEDS)]
     return ProgramHeader(
         ours=_OURS.search(header) is not None, by_control=by_control is not None,
@@ -189,7 +193,7 @@ def read_header(data: bytes) -> ProgramHeader:
         setup=_named(setup) if setup else None, tolerance=_mm(tolerance),
         planned=_PLANNED.search(header) is not None, feeds=marks[1],
         hooks=hooks[1].decode("utf-8", "replace").strip().removesuffix(")") if hooks else "",
-        smoothing=_mm(smoothing))
+        smoothing=_mm(smoothing), axis_tolerance=float(axis[1]) if axis else 0.0)
 
 
 def _mm(said: re.Match[bytes] | None) -> float:

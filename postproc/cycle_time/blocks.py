@@ -102,7 +102,7 @@ class Pauses:
 
 
 _SHARED = ("line", "rapid", "arc", "center", "normal", "sweep", "speed", "path", "tolerance", "chain",
-           "operation")
+           "operation", "given", "pieces", "tool", "level", "turn_tolerance")
 """columns that are kept once where all rows are the same"""
 
 
@@ -168,7 +168,8 @@ class MotionBlocks:
 
     def __post_init__(self) -> None:
         for name in _SHARED:
-            object.__setattr__(self, name, shared(np.asarray(getattr(self, name))))
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, shared(np.asarray(getattr(self, name))))
 
     def __len__(self) -> int:
         return len(self.line)

@@ -24,8 +24,8 @@ from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, merge
 from postproc.cycle_time.lookahead import rest_to_rest, rests
 from postproc.cycle_time.model import CycleTimeModel
 from postproc.cycle_time.phases import ramps
-from postproc.cycle_time.shape import Shape, axis_limit, shape
-from toolpaths.arrays import Bools, Floats, Ints
+from postproc.cycle_time.shape import Shape, axis_limit, shape, shape_within
+from toolpaths.arrays import Bools, Floats, Ints, repeated
 from toolpaths.compiled import chosen
 
 EXECUTED = ("control", "formulas")
@@ -37,9 +37,10 @@ _Law = Callable[[Floats, Floats, Floats, Floats], Floats]
 def lower_bound(blocks: MotionBlocks, model: CycleTimeModel) -> float:
     """s below which no control can be on this path with these limits, dwells and tool changes included."""
     merged = merge(blocks)[0] if model.kind == "linuxcnc" else blocks
-    form, axes = shape(merged), merged.axes
+    axes, ramped = merged.axes, model.kind in EXECUTED and model.jerk
+    form, (velocity, rate) = shape_within(merged, axes.velocity, axes.acceleration)
+    form = shape(merged) if ramped else form
     length = form.length - cut_off(merged, form, model)
-    velocity, rate = (axis_limit(form.share, limit) for limit in (axes.velocity, axes.acceleration))
     if merged.arc.any():
         both = merged.arc & (axes.xyz >= 0).all()
         velocity, rate = (np.where(both, np.linalg.norm(limit[axes.xyz]), value)
@@ -47,7 +48,7 @@ def lower_bound(blocks: MotionBlocks, model: CycleTimeModel) -> float:
     target = np.minimum(np.where(merged.rapid, np.inf, merged.speed * max(model.override, 1.0)), velocity)
     rests = must_rest(merged, form, model)
     through = ~rests
-    free = np.full(len(merged), np.inf)
+    free = repeated(np.inf, len(merged))
     loop = chosen(speeds, len(merged), KERNEL_FROM)
     lent = shared_feed(merged, form, target, model)
     first, last = loop(length, lent, lent, rate, through, free, free)

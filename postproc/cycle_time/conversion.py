@@ -1,5 +1,5 @@
-"""The time of what a conversion has written, by formulas held against the control: where axes turn, what formulas are off
-depends on how points stand along curves (0.84 to 1.42 of their time on one path); a few hundred executed blocks say it.
+"""The time of what a conversion has written, by formulas held against the control: what they are off depends on how points
+stand along curves and how short lines are (0.84 to 1.42 of their time on one path); a few hundred executed blocks say it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from postproc.cycle_time.phases import BlockTimes, summed
 from postproc.cycle_time.report import as_dict, clock
 from postproc.cycle_time.source import from_conversion
 from postproc.pipeline.result import PostResult
-from toolpaths.arrays import Bools
+from toolpaths.arrays import Floats, Ints
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import read_value
 
@@ -27,15 +27,18 @@ BAND_UP_TO = 20_000
 """blocks up to which a conversion also gives the band, which takes some ten estimates"""
 STRETCHES, LONG, EDGE = 4, 150, 15
 """stretches that are executed, blocks of each, and blocks at both its ends that do not count: it begins and ends at rest"""
-FEWEST, LEAST_SHARE = 400, 0.1
-"""blocks, and share of the time in which axes turn, from which stretches are executed: what the control's clock loads takes
-half a second of processor time, which a small program is converted in"""
+FEWEST, MOST_OFF = 400, 0.02
+"""blocks, and what formulas may be off as a share of the time (BY_FORMULAS), from which stretches are executed: what the
+control's clock loads takes half a second of processor time, which a small program is converted in"""
 STUDENT, LEAST_OFF = 1.4, 0.03
 """times the deviation of the mean of STRETCHES (Student's 95 % over the normal's), and its least share: what stretches
 that begin and end at rest do not show"""
+FEW = 2
+"""stretches that hold a kind of motion at least whose times they correct"""
 RANKED = 1000
 """blocks up to which the control is executed for each of the programs that a choice is made of"""
-TURNING = KINDS.index("turning axes")
+SURE = np.array([BY_FORMULAS[name] for name in KINDS])
+"""what formulas are off by kind of motion"""
 
 
 def model_of(result: PostResult, model: str = "") -> CycleTimeModel:
@@ -115,7 +118,7 @@ def program_clock(model: str = "") -> ControlClock:
 def estimate_of(result: PostResult, model: str = "", executed: bool = False) -> Estimate | None:
     """The estimate under the model of the controller, or under `model`; None where nothing is written. With `executed`
     the control is executed where the model says how, as `postproc time` does: about 0.3 ms a block; without it over some
-    stretches where axes turn (`sampled`)."""
+    stretches (`sampled`)."""
     if not result.ok:
         return None
     planner = _model(result, model)
@@ -132,7 +135,7 @@ def estimate_of(result: PostResult, model: str = "", executed: bool = False) -> 
 
 @dataclass(frozen=True)
 class FormulaTimes:
-    """Times by formulas, those of turning axes by what the executed control takes of them.
+    """Times by formulas, corrected by kind of motion with what the executed control takes of stretches.
 
     Attributes:
         off: standard deviation of the program's time over the executed control's, as a share; None where no stretch was
@@ -144,8 +147,8 @@ class FormulaTimes:
 
 
 def sampled(blocks: MotionBlocks, model: CycleTimeModel) -> FormulaTimes:
-    """The times of a program by formulas, held against the control where axes turn; not where few do, where the program is
-    short, and where no motion is found.
+    """The times of a program by formulas, held against the control over stretches; most of these lie where formulas are
+    least sure. Not where the program is short, where formulas are sure, and where no motion is found.
 
     Args:
         model: of a control that is executed, with what the machine says of it (`of_machine`); of others the times are theirs
@@ -153,33 +156,35 @@ def sampled(blocks: MotionBlocks, model: CycleTimeModel) -> FormulaTimes:
     made = timed(blocks, model.quick())
     if model.kind != "control" or len(blocks) < FEWEST:
         return FormulaTimes(made, None)
-    turning = kinds(blocks, made) == TURNING
-    along = np.cumsum(np.where(turning, made.seconds, 0.0))
-    if along[-1] < LEAST_SHARE * float(made.seconds.sum()):
+    kind = kinds(blocks, made)
+    along = np.cumsum(made.seconds * SURE[kind])
+    if along[-1] < MOST_OFF * float(made.seconds.sum()):
         return FormulaTimes(made, None)
     middle = np.searchsorted(along, (np.arange(STRETCHES) + 0.5) / STRETCHES * along[-1])
-    pairs = [_pair(blocks, turning, model, max(int(k) - LONG // 2, 0)) for k in middle]
+    pairs = [_pair(blocks, kind, model, max(int(k) - LONG // 2, 0)) for k in middle]
     if any(pair is None for pair in pairs):
         return FormulaTimes(made, None)
-    executed, about = np.array(pairs, dtype=np.float64).T
-    factor = float(executed.sum() / about.sum())
-    scatter = float(np.linalg.norm(executed - factor * about)) * (STRETCHES / (STRETCHES - 1.0))**0.5 / float(about.sum())
+    executed, about = np.array(pairs, dtype=np.float64).transpose(1, 0, 2)
+    held = (about > 0.0).sum(axis=0)
+    known = held >= FEW
+    whole = np.where(known, about.sum(axis=0), 1.0)
+    factor = np.where(known, executed.sum(axis=0) / whole, 1.0)
+    scatter = np.linalg.norm(executed - factor * about, axis=0) * np.sqrt(held / np.maximum(held - 1.0, 1.0)) / whole
     share = time_by_kind(blocks, made) / max(float(made.seconds.sum()), 1e-9)
-    others = float(sum(share[k] * BY_FORMULAS[name] for k, name in enumerate(KINDS) if k != TURNING))
-    off = float(np.hypot(others, share[TURNING] * max(STUDENT * scatter / factor, LEAST_OFF)))
-    return FormulaTimes(slowed(made, blocks, np.where(turning, factor, 1.0)), off)
+    off = np.where(known, np.maximum(STUDENT * scatter / factor, LEAST_OFF), SURE)
+    return FormulaTimes(slowed(made, blocks, factor[kind]), float(share @ off))
 
 
-def _pair(blocks: MotionBlocks, turning: Bools, model: CycleTimeModel, low: int) -> tuple[float, float] | None:
-    """(s executed, s by formulas) of the turning blocks of a stretch; None where the control is not executed there."""
+def _pair(blocks: MotionBlocks, kind: Ints, model: CycleTimeModel, low: int) -> tuple[Floats, Floats] | None:
+    """((KINDS,) s executed, (KINDS,) s by formulas) of a stretch; None where the control is not executed there."""
     high = min(low + LONG, len(blocks))
+    low = max(high - LONG, 0)
     part = stretch(blocks, low, high)
-    count = np.flatnonzero(turning[low:high])
-    inner = count[(count >= EDGE) & (count < high - low - EDGE)]
     moved = timed(part, model)
-    if moved.found or not len(inner):
+    if moved.found:
         return None
-    return float(moved.seconds[inner].sum()), float(timed(part, model.quick()).seconds[inner].sum())
+    inner, about = kind[low:high][EDGE:-EDGE], timed(part, model.quick())
+    return (summed(moved.seconds[EDGE:-EDGE], inner, len(KINDS)), summed(about.seconds[EDGE:-EDGE], inner, len(KINDS)))
 
 
 def figures(e: Estimate | None) -> dict[str, Any]:

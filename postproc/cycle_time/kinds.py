@@ -54,20 +54,21 @@ def own_share(blocks: MotionBlocks, times: BlockTimes, model: CycleTimeModel, se
               off: float | None = None) -> float:
     """Standard deviation of a program's time over the model's own, as a share of `seconds`.
 
-    Of a model without a run by kind of motion (`OWN`), arcs and turns that hold their feed as lines at feed; kinds are
+    Arcs and turns that hold their feed count as lines at feed. Of a model without a run by kind of motion (`OWN`), kinds are
     independent of each other. Where the control is not executed, what the formulas are off. Of a calibrated model: what its
     run scatters, and by kind of motion what the model may be off where its parameters fit, each with the time that the
     program spends in it; errors of the kinds are added as if they all had one sign. `off` where stretches were executed.
     """
     record = model.calibration
-    spent = time_by_kind(blocks, times) / max(seconds, 1e-9)
-    formulas = 0.0 if model.kind != "formulas" else float(spent @ _row(BY_FORMULAS)) if off is None else off
+    lasting = max(seconds, 1e-9)
+    by_formulas = off if off is not None else float(time_by_kind(blocks, times) / lasting @ _row(BY_FORMULAS))
+    formulas = by_formulas if model.kind == "formulas" else 0.0
     if record is None and model.own_share is not None:
         return float(np.hypot(model.own_share, formulas))
+    kind = np.where(_at_feed(blocks, times), KINDS.index("lines at feed"), kinds(blocks, times))
+    spent = summed(times.seconds, kind, len(KINDS)) / lasting
     if record is None:
-        kind = np.where(_at_feed(blocks, times), KINDS.index("lines at feed"), kinds(blocks, times))
-        own = summed(times.seconds, kind, len(KINDS)) / max(seconds, 1e-9) * _row(OWN)
-        return float(np.hypot(np.linalg.norm(own), formulas))
+        return float(np.hypot(np.linalg.norm(spent * _row(OWN)), formulas))
     by_kind = _row({name: record.structure.get(name, NOT_SEEN[name]) for name in KINDS})
     return float(np.hypot(np.hypot(record.relative, spent @ by_kind), formulas))
 

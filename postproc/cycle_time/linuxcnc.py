@@ -16,8 +16,8 @@ from postproc.cycle_time.linuxcnc_corners import KINK, BlendArcs, Corners, blend
 from postproc.cycle_time.linuxcnc_kernels import next_begins, speeds, timeline
 from postproc.cycle_time.linuxcnc_segments import KERNEL_FROM, NORMAL_SHARE, PlannerSegments, clamped, segments
 from postproc.cycle_time.phases import BlockTimes, Ramps, ramps, summed
-from postproc.cycle_time.shape import NOTHING, shape
-from toolpaths.arrays import Array, Bools, Floats, Ints
+from postproc.cycle_time.shape import NOTHING, block_lengths
+from toolpaths.arrays import Array, Bools, Floats, Ints, repeated
 from toolpaths.compiled import chosen
 from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
@@ -37,7 +37,7 @@ GAP_CYCLES = 4.0
 
 COMPILED_FROM = 4_000
 """segments that are executed cycle by cycle, from which compiling pays"""
-_TOGETHER = 100_000
+_TOGETHER = 20_000
 """corners that are looked at together"""
 ON_CYCLE = 1e-6
 """of a servo cycle: nearer to its begin a moment falls on it"""
@@ -65,7 +65,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-@arrays(owner="M", length="M", asked="M", most="M", rate="M", ends="M", kink="M", fresh="M", traverse="M",
+@arrays(owner="M", length="M", asked="M", most="M", rate="M", ends="int8: M", kink="M", fresh="M", traverse="M",
         overlap_speed="M")
 class Row:
     """M segments and blend arcs in the order of motion; fields as in `PlannerSegments`."""
@@ -75,7 +75,7 @@ class Row:
     asked: Floats
     most: Floats
     rate: Floats
-    ends: Ints
+    ends: Array
     kink: Floats
     fresh: Bools
     traverse: Bools
@@ -87,13 +87,15 @@ def linuxcnc(blocks: MotionBlocks, settings: Settings | None = None) -> BlockTim
     settings = settings or Settings()
     s = segments(blocks, settings.override, settings.rapid)
     row = in_a_row(s, settings.cycle)
-    return _timed(blocks, s, row, settings)
+    block, length = s.block, s.length if len(s) == len(blocks) else block_lengths(blocks)
+    del s  # a long program's columns, here and below
+    return _timed(blocks, block, length, row, settings)
 
 
 def in_a_row(s: PlannerSegments, cycle: float) -> Row:
     """Every corner decided, blend arcs put in, lengths trimmed, accelerations shared out."""
     count = len(s)
-    ends = np.where(s.blocks.path == CornerMode.BLEND, OVERLAP, STOP)
+    ends = np.where(s.blocks.path == CornerMode.BLEND, np.int8(OVERLAP), np.int8(STOP))
     joined = ~s.fresh[1:]
     change = joined & (s.blocks.rapid[1:] != s.blocks.rapid[:-1])
     ends[:-1][change] = STOP
@@ -158,7 +160,7 @@ def _pull(s: PlannerSegments, rows: Ints, share: Floats) -> Floats:
     spoke = s.blocks.xyz_before(rows) - s.blocks.center[rows]
     inward = -spoke / np.maximum(np.linalg.norm(spoke, axis=1, keepdims=True), 1e-300)
     normal = np.where(s.blocks.arc[rows], (0.5 * s.asked[rows]) ** 2 / radius, 0.0)
-    pull = tangent * (s.acceleration * share)[rows][:, None] + inward * normal[:, None]
+    pull = tangent * (s.acceleration[rows] * share[rows])[:, None] + inward * normal[:, None]
     return np.asarray(pull / np.maximum(np.linalg.norm(pull, axis=1, keepdims=True), 1e-300))
 
 
@@ -182,21 +184,21 @@ def _put_together(s: PlannerSegments, c: Corners, ends: Array, at: Ints, arcs: B
     load = c.load.copy()
     load[at[~tangent]] = 0.0
     load[at] = np.where(tangent, load[at], 0.0)
-    reduce = np.maximum(np.append(load, 0.0), np.concatenate([[0.0], load]))
-    halved = (ends == OVERLAP) | np.concatenate([[False], (ends[:-1] == OVERLAP) & c.straight])
-    share = (1.0 - reduce) * np.where(halved, 0.5, 1.0)
-    most = np.where(np.append(joined, False), clamped(length, clamped(s.length, s.most, cycle), cycle),
-                    clamped(s.length, s.most, cycle))
+    share = 1.0 - np.maximum(np.append(load, 0.0), np.concatenate([[0.0], load]))
+    del load
+    share[(ends == OVERLAP) | np.concatenate([[False], (ends[:-1] == OVERLAP) & c.straight])] *= 0.5
+    most = clamped(s.length, s.most, cycle)
+    np.minimum(most, length / cycle, out=most, where=np.append(joined, False))
     rate, most = _along_arcs(s, s.acceleration * share, most, np.append(joined, False))
     used = (length[arc_at] < GAP_CYCLES * cycle * arcs.most[arc]) & ~s.blocks.arc[arc_at]
     used &= ~np.concatenate([[False], halved_before(ends, c)])[arc_at]
     keep = np.ones(count, dtype=bool)
     keep[arc_at[used]] = False
     blend_length = arcs.length[arc] + np.where(used, length[arc_at], 0.0)
-    order = np.argsort(np.concatenate([2 * np.flatnonzero(keep), 2 * arc_at + 1]), kind="stable")
+    order = np.argsort(np.concatenate([2 * np.flatnonzero(keep), 2 * arc_at + 1]), kind="stable") if len(arc) else arc
 
     def both(segment: Array, blend: Array) -> Array:
-        return np.concatenate([segment[keep], blend])[order]
+        return np.concatenate([segment[keep], blend])[order] if len(arc) else segment
     kink = np.where(ends == TANGENT, np.append(np.where(c.tangent | _mask(at[tangent], count - 1), c.speed, np.inf), np.inf),
                     np.inf)
     here = np.flatnonzero((ends[:-1] == OVERLAP) & joined)
@@ -210,7 +212,7 @@ def _put_together(s: PlannerSegments, c: Corners, ends: Array, at: Ints, arcs: B
     fresh_blend = fresh[arc_at] & used
     return Row(both(np.arange(count), arc_at), both(length, blend_length), both(s.asked, arcs.asked[arc]),
                both(most, clamped(blend_length, arcs.most[arc], cycle)),
-               both(rate, TANGENTIAL * arcs.acceleration[arc]), both(ends, np.full(len(arc), TANGENT)),
+               both(rate, TANGENTIAL * arcs.acceleration[arc]), both(ends, np.full(len(arc), TANGENT, np.int8)),
                both(kink, np.full(len(arc), np.inf)), both(fresh, fresh_blend),
                both(s.blocks.rapid, s.blocks.rapid[arc_at]), both(overlap, np.zeros(len(arc))))
 
@@ -243,8 +245,8 @@ def _along_arcs(s: PlannerSegments, rate: Floats, most: Floats, finished: Bools)
     return np.where(arc, rate * part, rate), slower
 
 
-def _timed(blocks: MotionBlocks, s: PlannerSegments, row: Row, settings: Settings) -> BlockTimes:
-    """Speeds by look-ahead, ramps, and everything put on the clock."""
+def _timed(blocks: MotionBlocks, segment_of: Ints, length: Floats, row: Row, settings: Settings) -> BlockTimes:
+    """Speeds by look-ahead, ramps, and everything put on the clock; last block (N,) of segments, `length` (E,) of blocks."""
     through = (row.ends == TANGENT) & ~np.append(row.fresh[1:], True)
     behind = np.concatenate([[False], through[:-1]])
     inside = behind & ~np.append(row.fresh[1:], True)
@@ -258,12 +260,13 @@ def _timed(blocks: MotionBlocks, s: PlannerSegments, row: Row, settings: Setting
     stops = ~through
     overlap = _overlapping(row, r, settings, target, first)
     settling = np.where(stops & (overlap == 0.0), settings.stop_cycles * settings.cycle, 0.0)
-    pause, resting = _pauses(blocks, s, row)
+    pause, resting = _pauses(blocks, segment_of, row)
     clock = chosen(timeline, len(row.length), KERNEL_FROM)
     begin, end = clock(r.seconds + settling, overlap, resting, row.fresh)
     end[-1:] += SETTLED
-    del behind, inside, most, target, ahead, gentle, overlap, settling, resting  # a long program's columns
-    return _by_block(blocks, s, row, r.up + r.down, r.steady, begin, end, pause, stops, first, last, r.peak)
+    ramp, steady, peak = r.up + r.down, r.steady.copy(), r.peak
+    del behind, inside, most, target, ahead, gentle, overlap, settling, resting, r
+    return _by_block(segment_of, length, row, ramp, steady, begin, end, pause, stops, first, last, peak)
 
 
 def _overlapping(row: Row, r: Ramps, settings: Settings, target: Floats, first: Floats) -> Floats:
@@ -296,57 +299,56 @@ def _ahead(row: Row, depth: int) -> Floats:
     return np.asarray(np.sqrt(np.maximum(window, 0.0)))
 
 
-def _pauses(blocks: MotionBlocks, s: PlannerSegments, row: Row) -> tuple[Floats, Floats]:
+def _pauses(blocks: MotionBlocks, segment_of: Ints, row: Row) -> tuple[Floats, Floats]:
     """(P,) s of each pause, and (M,) s of rest behind each segment of the row."""
     p = blocks.pauses
     seconds = p.seconds + np.array([COMMAND[Cause(k)] for k in range(len(Cause))])[p.cause]
-    segment = np.minimum(np.searchsorted(s.block, np.maximum(p.block, 0)), len(s) - 1)
+    segment = np.minimum(np.searchsorted(segment_of, np.maximum(p.block, 0)), len(segment_of) - 1)
     position = np.searchsorted(row.owner, segment, side="right") - 1
     inside = p.block >= 0
     return seconds, summed(seconds[inside], position[inside], len(row.length))
 
 
-def _by_block(blocks: MotionBlocks, s: PlannerSegments, row: Row, ramp: Floats, steady: Floats, begin: Floats, end: Floats,
+def _by_block(segment_of: Ints, own: Floats, row: Row, ramp: Floats, steady: Floats, begin: Floats, end: Floats,
               pause: Floats, stops: Bools, first: Floats, last: Floats, peak: Floats) -> BlockTimes:
-    """Segments' times shared out to the blocks that they stand for, by length."""
-    count = len(blocks)
-    begin, end, ramp, steady = _apart(begin, end, ramp, steady)
-    merged_end = np.zeros(len(s))
+    """Segments' times shared out to the blocks that they stand for, by length `own` (E,), written over times."""
+    count, segments = len(own), len(segment_of)
+    _apart(begin, end, ramp, steady)
+    merged_end = np.zeros(segments)
     np.maximum.at(merged_end, row.owner, end)
-    merged_begin = np.full(len(s), np.inf)
+    merged_begin = np.full(segments, np.inf)
     np.minimum.at(merged_begin, row.owner, begin)
     missing = ~np.isfinite(merged_begin)
     merged_begin[missing] = merged_end[missing] = 0.0
-    owner = np.searchsorted(s.block, np.arange(count))
-    own = s.shape.length if len(s) == count else shape(blocks).length
-    total = summed(own, owner, len(s))
+    owner = np.searchsorted(segment_of, np.arange(count)).astype(np.int32)
+    total = summed(own, owner, segments)
     part = own / np.where(total[owner] > 0.0, total[owner], 1.0)
     done = np.cumsum(part)
-    first_of = np.searchsorted(owner, np.arange(len(s)))
+    first_of = np.searchsorted(owner, np.arange(segments, dtype=np.int32))
     done -= (done - part)[first_of][owner]
     span = merged_end - merged_begin
     finish = merged_begin[owner] + done * span[owner]
     start = finish - part * span[owner]
-    del begin, end, merged_begin, merged_end, missing, own, total, done, first_of, span
+    del begin, end, merged_begin, merged_end, missing, total, done, first_of, span
     loss_first, loss_last = ((peak - v) ** 2 / (2.0 * row.rate * np.maximum(peak, 1e-300)) for v in (first, last))
     stopped_before = np.concatenate([[True], stops[:-1]])
     lost_stop = np.where(stopped_before, loss_first, 0.0) + np.where(stops, loss_last, 0.0)
     lost_corner = np.where(stopped_before, 0.0, loss_first) + np.where(stops, 0.0, loss_last)
 
     def shared(values: Floats) -> Floats:
-        return summed(values, row.owner, len(s))[owner] * part
-    return BlockTimes(start, finish, shared(ramp), shared(steady), np.zeros(count), _peak(row, peak, len(s))[owner],
+        return summed(values, row.owner, segments)[owner] * part
+    return BlockTimes(start, finish, shared(ramp), shared(steady), repeated(0.0, count), _peak(row, peak, segments)[owner],
                       shared(lost_stop), shared(lost_corner), pause)
 
 
-def _apart(begin: Floats, end: Floats, ramp: Floats, steady: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Begins and ends where overlapping segments share the time between them, and their phases shortened alike."""
-    begin, end = begin.copy(), end.copy()
+def _apart(begin: Floats, end: Floats, ramp: Floats, steady: Floats) -> None:
+    """Begins and ends so that overlapping segments share the time between them, and their phases shortened alike."""
     over = np.flatnonzero(begin[1:] < end[:-1])
     middle = (begin[over + 1] + end[over]) / 2.0
     begin[over + 1], end[over] = middle, middle
     scale = np.minimum(1.0, (end - begin) / np.maximum(ramp + steady, 1e-300))
-    return begin, end, ramp * scale, steady * scale
+    ramp *= scale
+    steady *= scale
 
 
 def _peak(row: Row, peak: Floats, count: int) -> Floats:

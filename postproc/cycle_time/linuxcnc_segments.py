@@ -12,7 +12,7 @@ import numpy as np
 
 from postproc.cycle_time.blocks import Axes, CornerMode, MotionBlocks
 from postproc.cycle_time.linuxcnc_kernels import chain_ends
-from postproc.cycle_time.shape import Shape, axis_limit, shape
+from postproc.cycle_time.shape import Shape, shape, shape_within
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.compiled import chosen
 from toolpaths.dataclass import dataclass
@@ -51,8 +51,7 @@ class PlannerSegments:
 def segments(blocks: MotionBlocks, override: float = 1.0, rapid: float = 1.0) -> PlannerSegments:
     """The segments that the planner is given; feeds and rapids times their overrides."""
     merged, block = merge(blocks)
-    form, axes = shape(merged), merged.axes
-    most, acceleration = axis_limit(form.share, axes.velocity), axis_limit(form.share, axes.acceleration)
+    form, (most, acceleration) = shape_within(merged, merged.axes.velocity, merged.axes.acceleration)
     if merged.arc.any():
         _arc_limits(merged, form, most, acceleration)
     fresh = np.concatenate([[True], merged.forced[:-1]])

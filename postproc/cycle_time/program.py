@@ -10,7 +10,7 @@ import numpy as np
 from machines.machine import Machine
 from postproc.control.control import Control
 from postproc.cycle_time.blocks import OFF, Axes, Cause, CornerMode, MotionBlocks, Pauses
-from postproc.cycle_time.shape import NOTHING, shape
+from postproc.cycle_time.shape import NOTHING, block_lengths, shape_within
 from postproc.readback.execution.execute import Motion
 from postproc.readback.execution.poses import arc_sweeps, coordinates, positions
 from postproc.readback.text.canonical import (
@@ -75,7 +75,8 @@ def blocks_of(code: Canonical, motion: Motion, machine: Machine, control: Contro
     """
     origin = origin or BlockOrigin.by_tool(motion)
     block, words, unit = motion.block, code.words, np.where(machine.rotary, DEG, 1.0)
-    points = np.concatenate([motion.start[None], motion.end]) * unit
+    points = np.concatenate([motion.start[None], motion.end])
+    points *= unit
     start, end = points[:-1], points[1:]
     arc = motion.code == 2
     normal, sweep, center = _arcs(motion, control, arc, start)
@@ -239,12 +240,15 @@ def _turning(before: Floats, end: Floats, control: Control) -> Bools:
 
 def _speeds(motion: Motion, blocks: MotionBlocks, linear: Bools, by_radius: bool) -> Floats:
     """(E,) mm/s or rad/s that the feed word asks for."""
-    form, unit = shape(blocks), motion.unit
+    unit = motion.unit
     per_minute = motion.feed * np.where(linear, unit, DEG)
     least = LEAST_RATE * np.where(linear, unit, DEG)
     around = np.where(blocks.arc & by_radius, blocks.sweep, 1.0)
-    rate = motion.feed * form.length / np.where(around > 0.0, around, 1.0)
-    asked = np.where(motion.inverse, np.maximum(rate, least), per_minute) / 60.0
+    asked = per_minute
+    if motion.inverse.any():
+        rate = motion.feed * block_lengths(blocks) / np.where(around > 0.0, around, 1.0)
+        asked = np.where(motion.inverse, np.maximum(rate, least), per_minute)
+    asked = asked / 60.0
     return np.where(blocks.rapid, np.inf, asked)
 
 
@@ -252,9 +256,7 @@ def _clamped(speed: Floats, blocks: MotionBlocks, linear: Bools, machine: Machin
     """Speeds (E,) as the control runs them: at feed none above the largest cutting feed, of the machine and of each axis."""
     if not math.isfinite(machine.largest_feed) and not machine.cutting_velocity:
         return speed
-    form = shape(blocks)
-    with np.errstate(divide="ignore"):
-        own = (machine.cutting_limits.velocity / form.share).min(axis=1)
+    _, (own,) = shape_within(blocks, machine.cutting_limits.velocity)
     most = np.minimum(own, machine.largest_feed * np.where(linear, 1.0, DEG))
     return np.asarray(np.where(blocks.rapid, speed, np.minimum(speed, most)))
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.cycle_time.blocks import Axes, MotionBlocks
-from toolpaths.arrays import Bools, Floats, repeated
+from toolpaths.arrays import Bools, Floats, repeated, slices
 from toolpaths.dataclass import dataclass
 from toolpaths.rotations import lengths
-from toolpaths.shapes import arrays
+from toolpaths.shapes import arrays, rows_of
 
 NOTHING = 1e-9
 """mm or rad below which an axis does not move (LinuxCNC: 1e-8 of its units)"""
@@ -69,6 +69,29 @@ def shape(blocks: MotionBlocks) -> Shape:
         _arcs(blocks, length, radius, climb, first, last, share)
     return Shape(length, turns, radius, climb, first, last,
                  share / np.where(length > 0.0, length, 1.0)[:, None])
+
+
+def shape_within(blocks: MotionBlocks, *limits: Floats) -> tuple[Shape, list[Floats]]:
+    """The geometry of every block with NaN in the place of `share`, which takes more room than all the rest, and for each
+    limit (A,) what `axis_limit` makes of it (E,)."""
+    count, round_ = len(blocks), bool(blocks.arc.any())
+    length, turns, first = np.empty(count), np.empty(count, dtype=bool), np.empty((count, 3))
+    radius, climb = (np.empty(count) if round_ else repeated(0.0, count) for _ in range(2))
+    last, most = np.empty((count, 3)) if round_ else first, [np.empty(count) for _ in limits]
+    for rows in slices(count):
+        one = shape(rows_of(blocks, "E", rows))
+        length[rows], turns[rows], first[rows] = one.length, one.turns, one.first
+        if round_:
+            radius[rows], climb[rows], last[rows] = one.radius, one.climb, one.last
+        for found, limit in zip(most, limits, strict=True):
+            found[rows] = axis_limit(one.share, limit)
+    unknown = repeated(np.full(blocks.end.shape[1], np.nan), count)
+    return Shape(length, turns, radius, climb, first, last, unknown), most
+
+
+def block_lengths(blocks: MotionBlocks) -> Floats:
+    """(E,) lengths that feeds refer to."""
+    return np.concatenate([shape(rows_of(blocks, "E", rows)).length for rows in slices(len(blocks))])
 
 
 def _arcs(blocks: MotionBlocks, length: Floats, radius: Floats, climb: Floats, first: Floats, last: Floats,

@@ -104,8 +104,6 @@ def staged(result: PostResult, progress: Progress | None = None,
         if stage.name == "write" and begun.keep == "summary" and is_summed_up(made.job, made.machine):
             figures = written_figures(made.job, made.toolpath, made.path, made.program, made.feeds)
             made, result = without_path(made), replace(result, figures=figures, path=None, program=None, feeds=None)
-    if result.figures is not None and result.comparison is not None:
-        result = replace(result, comparison=result.comparison.without_poses())
     return replace(result, text=made.text, files=made.files)
 
 
@@ -296,6 +294,8 @@ def verified(made: WrittenStage, progress: Progress | None) -> tuple[VerifiedSta
     found += [] if comparison is None else stated_smoothing(comparison, job, "")
     if comparison is not None and made.motion is not None and not has_errors(found):
         found = [*found, *_against_plan(made, made.motion, comparison)]
+    if comparison is not None and made.path is None:  # let go of what nothing looks at any more (`PostResult.keep`)
+        comparison = comparison.without_poses()
     if comparison is not None and not has_errors(found):
         witness, more = second_witness(made.source, made.asked or made.setup, made.options, job, comparison,
                                        b"" if made.files else made.text)

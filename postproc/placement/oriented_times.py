@@ -9,7 +9,7 @@ from postproc.orientation.passes.passes import PassContext
 from postproc.orientation.plans.choice import OrientationChoice
 from postproc.orientation.plans.orient import orient
 from postproc.placement.bodies import StationaryBodies
-from postproc.placement.place_times import TimedPlace, Timer, extents, refused_pass
+from postproc.placement.place_times import TimedPlace, Timer, extents, limit_of, limiting_times, refused_pass
 from postproc.placement.reasons import NoOrientation, NoSafePlane
 from postproc.placement.space import Space
 from postproc.setup.model import SetupFile
@@ -60,9 +60,7 @@ class OrientedTimer(Timer):
         singular, why = self._singular(plan.picked)
         if why is not None:
             return self._refused(place, why, low, high, singular)
-        cutting, limiting = float(plan.cuts.sum()), dict[str, float]()
-        for made, spent in zip(plan.picked, plan.cuts.tolist(), strict=True):
-            name = " ".join(made.limiting).strip()
-            limiting[name] = limiting.get(name, 0.0) + spent
+        cutting = float(plan.cuts.sum())
+        limiting = limiting_times(zip(plan.cuts.tolist(), map(limit_of, plan.picked), strict=True))
         return TimedPlace(place, plan.seconds, cutting, plan.seconds - cutting, plan.seconds, low, high, singular, None,
                           limiting)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import field, replace
 from functools import partial
@@ -45,7 +45,7 @@ class TimedPlace:
         low, high (J,): extents of the joints over all cuts and rapids, NaN where the machine does not reach
         singular: least distance from singular positions, inf for serial machines
         refused: why the part cannot stand there, None where it can
-        limiting: planned seconds by what limits the passes most, e.g. {"X jerk": 3.2}
+        limiting: planned seconds by what limits the passes most, e.g. {"X jerk": 3.2}; those of holes are not in it
     """
 
     place: Floats
@@ -163,11 +163,8 @@ class Timer:
             self.pruned += 1
             return TimedPlace(place, np.inf, np.inf, seen.linking, bound + seen.linking, seen.low, seen.high, seen.singular)
         cutting = float(sum(each[0] for each in cuts))
-        limiting: dict[str, float] = {}
-        for spent, name in cuts:
-            limiting[name] = limiting.get(name, 0.0) + spent
         return TimedPlace(place, cutting + seen.linking, cutting, seen.linking, bound + seen.linking, seen.low, seen.high,
-                          seen.singular, None, limiting)
+                          seen.singular, None, limiting_times(cuts))
 
     def seen(self, place: Floats) -> SeenPlace | TimedPlace:
         """A place (6,) with its cuts to be planned; refused, or timed without a bound, where that is known already."""
@@ -286,7 +283,21 @@ def _key(place: Floats) -> bytes:
 
 
 def _planned(made: Candidate) -> tuple[float, str, bool]:
-    return made.seconds, " ".join(made.limiting).strip(), made.solved
+    return made.seconds, limit_of(made), made.solved
+
+
+def limit_of(made: Candidate) -> str:
+    """What limits a pass most, "X jerk" or "feed"; empty where it only drills, or the machine states no jerk."""
+    return " ".join(made.limiting).strip()
+
+
+def limiting_times(cuts: Iterable[tuple[float, str]]) -> dict[str, float]:
+    """Seconds by what limits them, of (seconds, `limit_of`) each; see `TimedPlace`."""
+    times: dict[str, float] = {}
+    for spent, name in cuts:
+        if name:
+            times[name] = times.get(name, 0.0) + spent
+    return times
 
 
 def _known(plan: tuple[float, str, bool]) -> tuple[float, str, bool]:

@@ -85,7 +85,7 @@ def as_text(choice: PlacementChoice) -> str:
     lines.append("margin of travel: " + ", ".join(_margins(choice)))
     if choice.best.limiting:
         worst = max(choice.best.limiting, key=lambda name: choice.best.limiting[name])
-        lines.append(f"limited by {worst or 'nothing'} over {choice.best.limiting[worst]:.3f} s of the cuts")
+        lines.append(f"limited by {worst} over {choice.best.limiting[worst]:.3f} s of the cuts")
     turned = _turned(choice)[1:_SHOWN]
     if turned:
         others = (f"{one.place[ANGLES] / DEG:.3f} deg {one.seconds:.3f} s" for one in turned)

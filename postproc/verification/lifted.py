@@ -47,6 +47,12 @@ def lifted(motion: Motion, code: Canonical, letters: tuple[str, ...], offsets: O
     return replace(motion, end=end, center=center)
 
 
+def always_lifted(motion: Motion) -> bool:
+    """Whether `lifted` needs no words but those of the register and of the height, whatever lengths are held."""
+    whole = motion.hole.any() or (motion.code == ARC).any() or motion.contour.any()
+    return motion.table.plain and not whole
+
+
 def _gained(code: Canonical, letter: str, offsets: Offsets, held: Mapping[int, float]) -> tuple[Floats, Floats]:
     """(B + 1,) mm that the active register holds more at each block, and that the axis of `letter` stands higher by behind
     it."""

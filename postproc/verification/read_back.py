@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from machines.machine import Machine
 from postproc.base.header_words import HEADER, NO_FILE, ProgramHeader, read_header, same_name
 from postproc.base.options import Options
 from postproc.base.progress import Progress
@@ -32,10 +33,11 @@ from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion, run
 from postproc.readback.execution.offsets import Offsets
 from postproc.readback.execution.poses import BlockPoses
-from postproc.readback.text.canonical import placed
+from postproc.readback.text.canonical import Canonical, placed
 from postproc.verification.asked_output import check_asked
 from postproc.verification.executed import executed_poses
 from postproc.verification.length_limits import LengthTrial, length_margins
+from postproc.verification.lifted import always_lifted
 from toolpaths.arrays import Floats
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, warning
 from toolpaths.rotations import angle_between
@@ -106,8 +108,9 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     offsets = _offsets(job, reader, home)
     motion, found = run(code, machine.axis_names, offsets, gcode)
     faults = Faults(job.toolpath.file, gcode)
-    unseen, whole = check_start(code, job, faults), code
-    code = code.without((*machine.axis_names, *(a.lower() for a in machine.axis_names), *"IJKijk"))
+    unseen, alone = check_start(code, job, faults), check_length_alone(data, code, job, gcode)
+    whole = _asked_later(code, motion, job, offsets)
+    code = whole.without(_axis_words(machine))
     diagnostics += [_located(d, job.toolpath.file, of_cl) for d in found]
     if has_errors(diagnostics):
         return None, diagnostics
@@ -124,7 +127,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     lengths = [] if any(d.code == "verify.state" for d in comparison.diagnostics) else check_lengths(motion, job, faults)
     unseen += [*lengths, *changed, *check_end(motion, job, home, faults), *check_changes(code, motion, job, home, faults),
                *check_stops(code, motion, job, faults), *check_clamps(whole, motion, job, comparison.owner, faults),
-               *check_length_alone(data, whole, job, gcode), *check_options(code, motion, job, faults),
+               *alone, *check_options(code, motion, job, faults),
                *check_index(motion, job, home, comparison.owner, faults), *check_stock(data, job, faults),
                *check_safe_planes(motion, executed, job, home, comparison.owner, faults),
                *check_hooks(data, code, motion, job, comparison.owner, faults),
@@ -135,10 +138,40 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
         noted = [*(_of_model(header, job.errors, gcode, has_errors(noted)) if header.corrected is not None else
                    _uncorrected(header, job, motion, executed, comparison, gcode) if has_errors(noted) else []), *noted,
                  *_unmeasured(motion, executed, job, faults)]
+    noted = _converted_with(noted, header, job)
     if margins and not has_errors([*comparison.diagnostics]):
         trial = LengthTrial(whole, offsets, job)
         comparison = replace(comparison, lengths=length_margins(trial, motion, executed, comparison))
     return comparison, [*diagnostics, *noted]
+
+
+def _converted_with(found: list[Diagnostic], header: ProgramHeader, job: Job) -> list[Diagnostic]:
+    """The same; the first error names the tolerances of the header where these allow more than is asked for here."""
+    options, errors = job.options, [k for k, d in enumerate(found) if d.severity is Severity.ERROR]
+    stated = (("tolerance", header.tolerance, options.tolerance),
+              ("axis-tolerance", header.axis_tolerance, options.axis_tolerance))
+    said = [f"--{name} {mine:g}" for name, mine, here in stated if mine > here * (1.0 + 1e-9)]
+    if not (said and errors and header.ours):
+        return found
+    k = errors[0]
+    hint = f"verify with {' '.join(said)}, which the program was converted with by its header"
+    return [*found[:k], replace(found[k], hint="; ".join(part for part in (found[k].hint, hint) if part)), *found[k + 1:]]
+
+
+def _axis_words(machine: Machine) -> tuple[str, ...]:
+    """Letters of words that say where axes and centres are."""
+    return (*machine.axis_names, *(a.lower() for a in machine.axis_names), *"IJKijk")
+
+
+def _asked_later(code: Canonical, motion: Motion, job: Job, offsets: Offsets) -> Canonical:
+    """The program without axis words that nothing asks for once it is executed, half of what is known of a long one:
+    what states its axes again, and what executes it with tools of other lengths, may ask for all of them, else heights
+    and axes that are clamped by codes are asked for."""
+    if job.setup.output.restart or not always_lifted(motion):
+        return code
+    names = job.machine.axis_names
+    kept = {*job.machine.clamp_codes, *(names[z] for z in (int(offsets.xyz[2]),) if z >= 0)}
+    return code.without(tuple(letter for letter in _axis_words(job.machine) if letter.upper() not in kept))
 
 
 def _offsets(job: Job, reader: Reader, home: Floats) -> Offsets:

@@ -64,16 +64,18 @@ def limits_as_used(machine: Machine) -> Floats:
 def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlocks:
     """The motion of a program, read back, as plain arrays."""
     motion, control = comparison.executed[1], job.control
-    every = np.arange(len(motion))
     degrees, machine = _units(job.machine), _by_drives(job.machine)
 
     def driven(q: Floats) -> Floats:
         return q if machine is job.machine else job.machine.kinematics.drives(q)
 
-    joints = motion.end / degrees if control.base != "tcp" else driven(poses.joints(motion, every, 1.0))
+    whole = driven(poses.joints(motion, np.arange(len(motion)), 1.0)) if control.base == "tcp" else None
     straight = (motion.code != 2) & (motion.frame == 0) & (control.base != "tcp")
     if control.rapids == "dog-leg":
         straight &= motion.code != 0
+
+    def joints(rows: Ints) -> Floats:
+        return np.asarray(motion.end[rows] / degrees) if whole is None else np.asarray(whole[rows])
 
     def joints_at(rows: Ints, t: float | Floats) -> Floats:
         if isinstance(t, np.ndarray) and not t.any() and control.base != "tcp":
@@ -82,7 +84,7 @@ def executed_of(comparison: Comparison, poses: Poses, job: Job) -> ExecutedBlock
 
     def poses_at(rows: Ints, t: float | Floats) -> tuple[Floats, Floats]:
         if isinstance(t, float) and t == 1.0:
-            return comparison.tip[rows], comparison.axis[rows]
+            return comparison.ends(rows)
         return poses.poses(motion, rows, t)
 
     def steps(rows: Ints) -> Floats:
@@ -164,11 +166,11 @@ def second_witness(source: ClSource | None, setup: SetupFile, options: Options, 
         if setup.places:
             case = replace(case, setup=case.setup | {"turn": setup.places[k].turn, "measured": setup.places[k].turned})
         rows = _rows_at(comparison, job, k)
-        if not len(rows):
+        if rows is not None and not len(rows):
             return together(said), [error("witness.position", f"second witness: {name}no block of the program is made there",
                                           file=job.toolpath.file, hint="do not run this program")]
         try:
-            said.append(testify(case, executed if len(rows) == len(executed) else executed.take(rows)))
+            said.append(testify(case, executed if rows is None else executed.take(rows)))
         except (ArithmeticError, AssertionError, LookupError, TypeError, ValueError) as fault:
             # A file that it does not get through weakens the proof, which the text then says; it must not stop the program.
             why = f"the second witness failed: {type(fault).__name__}: {fault}"
@@ -223,10 +225,11 @@ def _order(setup: SetupFile, comparison: Comparison, job: Job) -> list[Diagnosti
                   file=job.toolpath.file, hint="do not run this program")]
 
 
-def _rows_at(comparison: Comparison, job: Job, place: int) -> Ints:
-    """The executed blocks under the work offset of a place: what the program itself says, not what it was written for."""
+def _rows_at(comparison: Comparison, job: Job, place: int) -> Ints | None:
+    """The executed blocks under the work offset of a place: what the program itself says, not what it was written for; None
+    for all of them where there is one place."""
     if len(job.places) < 2:
-        return np.arange(len(comparison.executed[1]))
+        return None
     reader = reader_for(job.controller, job.machine.axis_names)
     return np.flatnonzero(comparison.executed[1].offset == registers_of(job, reader)[place])
 
@@ -237,8 +240,7 @@ def _case(source: ClSource, setup: SetupFile, options: Options, job: Job, compar
     control, words, curves = job.control_at(place), job.controller.codes, len(comparison.executed[0].curves) > 0
     errors = error_tables(options.error_model) if job.corrects and options.error_model else ({}, {})
     machine = _by_drives(job.machine)
-    text = source.data if source.plug_in is None else source.records
-    return Case(text, machine_tables(machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
+    return Case(lambda: source.text, machine_tables(machine), setup.model_dump(), options.tolerance, job.axis_tolerance,
                 source.units or None, source.dialect or None, control.rapids == "dog-leg", comparison.planned, job.corrects,
                 *errors, "{register}" in words.length_offset, "{register}" in words.compensation_left,
                 sum(bit for bit, code in ((1, words.flood), (2, words.mist), (4, words.through), (8, words.air)) if code),

@@ -74,7 +74,7 @@ def tlon(r: Record, toward: tuple[float, ...] | None) -> tuple[Given, tuple[floa
 def resolved(given: dict[int, Given], tip: Array, place: Array, common: Array, frames: list[tuple[Array, Array]],
              scale: float, dialect: WitnessDialect) -> tuple[Array, Array, Array, Array, list[int]]:
     """(arc (N,), centre, normal (K, 3), sweep (K,), rows of arcs that this reader is not sure of) in the absolute frame."""
-    arc = np.full(len(tip), -1)
+    arc = np.full(len(tip), -1, np.int32)
     row = np.array([r for r in given if 0 < r < len(tip)], np.int64)
     own = [given[int(r)] for r in row]
     none = np.zeros((0, 3))

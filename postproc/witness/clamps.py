@@ -62,7 +62,8 @@ def _codes(program: bytes, codes: set[str]) -> tuple[Array, Array]:
 
 def _turned(executed: ExecutedBlocks, j: int) -> Array:
     """(E,) blocks that turn joint j."""
-    return np.asarray(np.abs(executed.joints[:, j] - executed.before(np.arange(len(executed)))[:, j]) > _STILL)
+    every = np.arange(len(executed))
+    return np.asarray(np.abs(executed.joints(every)[:, j] - executed.before(every)[:, j]) > _STILL)
 
 
 def _sharing(letter: str, clamps: dict[str, tuple[str, str]]) -> set[str]:

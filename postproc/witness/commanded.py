@@ -121,14 +121,23 @@ def unit(v: Array) -> Array:
         return np.asarray(np.where(size > 0.0, v / size, np.nan))
 
 
+def picked(values: Array, index: Array) -> Array:
+    """Values (K, ...) by an index (N,); by one that is kept once, the value is."""
+    if len(index) and index.strides[0] == 0:
+        return np.broadcast_to(values[index[0]], (len(index), *values.shape[1:]))
+    return np.asarray(values[index])
+
+
 def loads(tool: Array) -> Array:
     """(N,) row at which the tool of each row was loaded."""
+    if len(tool) and tool.strides[0] == 0:
+        return np.broadcast_to(0, len(tool))
     return np.maximum.accumulate(np.where(np.diff(tool, prepend=tool[:1] - 1) != 0, np.arange(len(tool)), 0))
 
 
-def registers_of(c: Commanded, tool: Array) -> Array:
-    """(N,) length register in force: one that was named since the tool of that number, `tool` (N,), was loaded, else OWN."""
-    return np.where(c.registered >= loads(tool), c.register, OWN)
+def registers_of(c: Commanded, loaded: Array, row: Array) -> Array:
+    """(K,) length register in force at rows: one that was named since the tool was loaded, at `loaded` (N,), else OWN."""
+    return np.where(c.registered[row] >= loaded[row], c.register[row], OWN)
 
 
 def tools_of(c: Commanded, setup: dict[str, Any]) -> Array:
@@ -142,3 +151,42 @@ def tools_of(c: Commanded, setup: dict[str, Any]) -> Array:
     own = np.array([asked.get(name, UNKNOWN) for name in c.names] + [UNKNOWN])[c.name]
     sure = (c.name >= 0) | set(asked).issubset(c.names)
     return np.asarray(np.where(own != UNKNOWN, own, np.where(sure & (c.tool > 0), c.tool, UNKNOWN)))
+
+
+def with_spindle(c: Commanded, setup: dict[str, Any]) -> Commanded:
+    """With the set-up's spindle where it counts: `[tools.N]` for a tool that no SPINDL record is for,
+    `[output]` where the spindle stands there too, either where no record at all states one, and the speed of
+    either where the file turns the spindle without one."""
+    output = (setup.get("output") or {}).get("spindle")
+    own = {int(n): t["spindle"] for n, t in (setup.get("tools") or {}).items() if (t or {}).get("spindle")}
+    if not len(c) or not (output or own):
+        return c
+    tool, silent = tools_of(c, setup), c.spindle == UNKNOWN
+    begin = loads(tool)
+    others = (c.turned < begin) | ((c.turned == begin) & (c.spindle == 0))
+    known = ~silent & (c.spindle != UNFOLLOWED)
+    spindle, rpm = c.spindle.copy(), c.rpm.copy()
+    for number in np.unique(tool).tolist():
+        wanted, here = own.get(number) or output, tool == number
+        if not wanted:
+            continue
+        none = here & known & np.isnan(c.rpm)
+        taken = here & (silent | (known & others & ((number in own) | (c.spindle == 0) | none)))
+        rpm[taken | none] = wanted["rpm"]
+        spindle[taken] = 1 if wanted["direction"] == "clockwise" else -1
+    return replace(c, spindle=spindle, rpm=rpm)
+
+
+def feeds_of(c: Commanded, setup: dict[str, Any], most: float) -> Array:
+    """(N,) mm/min that the CL file asks for at every position, but taps no more than `most`; NaN where it does not say."""
+    own = np.array([(x.feed, x.per_turn) for x in c.cycles] + [(math.nan, 0.0)], np.float64)
+    hole = c.cycle >= 0
+    feed = np.where(hole, own[c.cycle, 0], c.feed)
+    per_turn = np.where(hole, own[c.cycle, 1] > 0, c.per_turn)
+    tap = np.array([x.kind == "TAP" for x in c.cycles] + [False])[c.cycle]
+    default = (setup.get("output") or {}).get("feed")
+    if default:
+        feed = np.where(np.isnan(feed) & ~c.inverse & ~tap, float(default), feed)
+        per_turn = per_turn & ~(np.isnan(c.feed) & ~hole)
+    feed = np.where(per_turn, feed * c.rpm, np.where(c.inverse & ~hole, math.nan, feed))
+    return np.asarray(np.where(feed > np.where(tap, math.inf, most), most, feed))

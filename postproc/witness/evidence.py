@@ -13,7 +13,8 @@ from postproc.witness.text import Array
 
 @dataclass(frozen=True)
 class Case:
-    """A conversion: bytes of the CL file and how it is to be read, machine file over its bases, set-up, tolerances.
+    """A conversion: the CL file, as a call that gives its bytes, and how it is to be read, machine file over its bases,
+    set-up, tolerances.
 
     Attributes:
         machine: the parsed file, then its base and that one's
@@ -30,7 +31,7 @@ class Case:
             the tip of a tool without length stands there, None where it has no such joints
     """
 
-    cl: bytes
+    cl: Callable[[], bytes]
     machine: list[dict[str, Any]]
     setup: dict[str, Any]
     tolerance: float
@@ -61,7 +62,7 @@ class ExecutedBlocks:
 
     Attributes:
         letters: of the joints, words: of the columns of `steps`
-        joints (E, J) at the end of every block, mm and rad; start (J,)
+        joints: (K, J) at the end of blocks (K,), mm and rad; start (J,)
         line, code (E,): line of the program; 0 rapid, 1 feed, 2 arc; straight (E,): True where joints go straight
         sweep (E,): rad of arcs, NaN; feed (E,): F word in force, degrees, or lengths of which each is `unit` (E,) mm,
             per minute, or 1/min where `inverse` (E,)
@@ -83,7 +84,7 @@ class ExecutedBlocks:
 
     letters: tuple[str, ...]
     words: tuple[str, ...]
-    joints: Array
+    joints: Callable[[Array], Array]
     start: Array
     line: Array
     code: Array
@@ -122,7 +123,7 @@ class ExecutedBlocks:
         """(K, J) joints where blocks begin."""
         if self.begins is not None:
             return np.asarray(self.begins[rows])
-        return np.where((rows == 0)[:, None], self.start, self.joints[np.maximum(rows - 1, 0)])
+        return np.where((rows == 0)[:, None], self.start, self.joints(np.maximum(rows - 1, 0)))
 
     def take(self, rows: Array) -> ExecutedBlocks:
         """Some of the blocks, each beginning where the program has it begin."""
@@ -130,7 +131,8 @@ class ExecutedBlocks:
                    if f.name not in ("start", "begins") and isinstance(getattr(self, f.name), np.ndarray)}
         approach = self.approach_at
         stops = tuple((int(np.searchsorted(rows, k)), number) for k, number in self.stops)
-        return replace(self, **columns, begins=self.before(rows), stops=stops, steps=lambda some: self.steps(rows[some]),
+        return replace(self, **columns, begins=self.before(rows), stops=stops, joints=lambda some: self.joints(rows[some]),
+                       steps=lambda some: self.steps(rows[some]),
                        joints_at=lambda some, t: self.joints_at(rows[some], t),
                        poses_at=lambda some, t: self.poses_at(rows[some], t),
                        approach_at=None if approach is None else lambda some, t: approach(rows[some], t))

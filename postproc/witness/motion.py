@@ -36,13 +36,15 @@ class Walked:
         self.code = poses.executed.code
         self.inside = owner < len(targets)
         m = np.minimum(owner, max(len(targets) - 1, 0))
-        self.begin = np.concatenate([[0], np.flatnonzero(np.diff(owner)) + 1])
-        self.first = self.begin[np.searchsorted(self.begin, np.arange(len(owner)), side="right") - 1]
+        every = np.arange(len(owner), dtype=np.int32)
+        begin = every[np.append(True, np.diff(owner) != 0)[:len(owner)]]
+        count = np.diff(np.append(begin, len(owner)))
+        self.first = np.repeat(begin, count)
         self.kind = np.where(self.inside, targets.kind[m], -1)
         self.returns, departs = self._left_holes()
         """(E,) blocks owned by a cut that leave the hole before it: they belong to the hole"""
-        plain = np.where(poses.executed.hole | self.returns, len(owner), np.arange(len(owner)))
-        first = np.minimum.reduceat(plain, self.begin)[np.searchsorted(self.begin, np.arange(len(owner)), side="right") - 1]
+        every[poses.executed.hole | self.returns] = len(owner)
+        first = np.repeat(np.minimum.reduceat(every, begin), count)
         self.leaves = np.where(departs > 0, departs, np.where(first < len(owner), first, self.first))
         """first block of the target that is no return of a hole"""
         self.gap = np.where(self.inside, targets.gap[m], False)
@@ -68,9 +70,9 @@ class Walked:
         plane = np.einsum("ni,ni->n", t.tip[i - 1] - t.tip[i], along)
         free = (self.code[rows] == 0) | e.hole[rows] | (rise <= plane + near)
         level = np.where(np.isfinite(t.out[i]), rise <= t.out[i] + near, free)
-        returns, last = np.zeros(len(self.owner), bool), np.full(len(t) + 1, -1)
+        returns, last = np.zeros(len(self.owner), bool), np.full(len(t) + 1, -1, np.int32)
         returns[rows] = on & level & (rise >= before - near)
-        stays = np.append(0, np.cumsum(~returns))
+        stays = np.append(np.int32(0), np.cumsum(~returns, dtype=np.int32))
         leads_off = on & t.free[to] & (_above(t.tip[to], t.tip[i], along) > 2.0 * near)
         np.maximum.at(last, to[leads_off], rows[leads_off] + 1)
         return returns & (stays[1:] == stays[self.first]), last[np.minimum(self.owner, len(t))]
@@ -264,9 +266,9 @@ def _explained(w: Walked, rows: Array, margin: float, table: dict[str, object]) 
     beyond = np.zeros(len(w.targets) + 1, bool)
     for first in range(0, len(link), CHUNK):
         k = link[first:first + CHUNK]
-        linear, travels = machine.slides(e.joints[k], e.letters)
+        linear, travels = machine.slides(e.joints(k), e.letters)
         lift = np.linalg.solve(travels, 0.95 * margin * w.axis[k][:, :, None])[:, :, 0]
-        q = e.joints[k][:, linear] + lift
+        q = e.joints(k)[:, linear] + lift
         beyond[w.owner[k[((q < travel[linear, 0]) | (q > travel[linear, 1])).any(axis=1)]]] = True
     return np.asarray(beyond[w.owner[rows]])
 

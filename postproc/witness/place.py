@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -91,11 +93,11 @@ class Poses:
         """(K, J) joints of blocks at a fraction."""
         e = self.executed
         if t == 1.0:
-            return np.asarray(e.joints[rows])
-        q = np.empty((len(rows), e.joints.shape[1]))
+            return e.joints(rows)
+        q = np.empty((len(rows), len(e.letters)))
         straight = e.straight[rows]
         here = rows[straight]
-        q[straight] = (1.0 - t) * self.before(here) + t * e.joints[here]
+        q[straight] = (1.0 - t) * self.before(here) + t * e.joints(here)
         if not straight.all():
             q[~straight] = e.joints_at(rows[~straight], t)
         return q
@@ -160,11 +162,11 @@ class Cut:
         return np.asarray(above | (apart >= self.radius + margin))
 
 
-def cut_of(case: Case, c: Commanded, tip: Array, axis: Array, centre: Array, normal: Array,
+def cut_of(case: Case, c: Commanded, tip: Array, axis: Array, centre: Array, normal: Array, splines: dict[int, Array],
            place: tuple[Array, Array]) -> Cut | None:
-    """What the CL file cuts; tips (and behind them points of splines), axes, centres and normals in the table frame.
-    None where it cuts nothing."""
-    points = [tip[:len(c)][c.known & ((c.kind == LINE) | (c.kind == ARC))], tip[len(c):]]
+    """What the CL file cuts; tips, axes, centres, normals and points of splines in the table frame. None where it cuts
+    nothing."""
+    points = list(splines.values())
     holes = np.flatnonzero(c.known & (c.kind == HOLE))
     if len(holes):
         depth = np.array([x.depth for x in c.cycles])[c.cycle[holes]]
@@ -175,16 +177,21 @@ def cut_of(case: Case, c: Commanded, tip: Array, axis: Array, centre: Array, nor
         k = c.arc[arcs]
         for share in np.linspace(0.05, 0.95, 19):
             points.append(on_arc(tip[arcs - 1], tip[arcs], centre[k], normal[k], c.sweep[k], share))
-    some = [rows[np.isfinite(rows).all(axis=1)] for rows in points if len(rows)]
-    every = some[0] if len(some) == 1 else np.concatenate([tip[:0], *some])
-    del points, some
-    if not len(every):
+    cutting = c.known & ((c.kind == LINE) | (c.kind == ARC))
+
+    def some() -> Iterator[Array]:
+        for rows in chain((tip[k:k + CHUNK][cutting[k:k + CHUNK]] for k in range(0, len(c), CHUNK)), points):
+            if len(rows := rows[np.isfinite(rows).all(axis=1)]):
+                yield rows
+
+    ends = [(rows.min(axis=0), rows.max(axis=0)) for rows in some()]
+    if not ends:
         return None
-    corners = _box(every.min(axis=0), every.max(axis=0))
+    corners = _box(np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0))
     given, stock = case.setup.get("clearance", {}).get("centre"), (case.setup.get("rewind") or {}).get("stock")
     middle = 0.5 * (corners[0] + corners[-1]) if given is None else place[0] @ np.array(given, np.float64) + place[1]
     whole = [corners, _box(stock["low"], stock["high"]) @ place[0].T + place[1]] if stock else [corners]
-    far = max(((every[first:first + CHUNK] - middle) ** 2).sum(axis=1).max() for first in range(0, len(every), CHUNK))
+    far = max(((rows - middle) ** 2).sum(axis=1).max() for rows in some())
     return Cut(corners, middle, float(np.sqrt(far)), np.concatenate(whole))
 
 

@@ -40,7 +40,7 @@ def assembled(e: Execution) -> Commanded:
         matrix = np.eye(3) if common[row] else e.frames[place[row]][0]
         move = step[0] * axis[row] if len(step) == 1 else matrix @ np.array(step)
         tip[row] = tip[row - 1] + e.scale * move if row else np.nan
-    kind, cycle = np.full(n, LINE, np.int8), e.cycle.column(n, np.int64).copy()
+    kind, cycle = np.full(n, LINE, np.int8), e.cycle.column(n, np.int32).copy()
     arc, centre, normal, sweep, uncertain = arcs.resolved(e.arcs, tip, place, common, e.frames, e.scale, e.dialect)
     kind[list(e.arcs.keys() & set(range(n)))] = ARC
     cycle[arc >= 0] = -1
@@ -61,11 +61,11 @@ def assembled(e: Execution) -> Commanded:
     return Commanded(tip, axis, kind, line, known, gap, e.feed.spread(feed[:, 0], n), e.feed.spread(feed[:, 1] > 0, n),
                      e.feed.spread(feed[:, 2] > 0, n), arc, centre, normal,
                      sweep, cycle, tuple(e.cycles), e.tool.column(n, np.int64), e.side.column(n, np.int64),
-                     e.register.column(n, np.int64), e.register.spread(np.array(e.register.rows), n),
-                     e.name.column(n, np.int64), tuple(e.names),
+                     e.register.column(n, np.int64), e.register.spread(np.array(e.register.rows, np.int32), n),
+                     e.name.column(n, np.int32), tuple(e.names),
                      e.spindle.spread(spindle[:, 0].astype(np.int64), n), e.spindle.spread(spindle[:, 1], n),
-                     e.spindle.spread(np.array(e.spindle.rows), n), e.coolant.column(n, np.int64),
-                     e.coolant.spread(np.array(e.coolant.rows), n), e.systems, _first_system(e, place),
+                     e.spindle.spread(np.array(e.spindle.rows, np.int32), n), e.coolant.column(n, np.int64),
+                     e.coolant.spread(np.array(e.coolant.rows, np.int32), n), e.systems, _first_system(e, place),
                      e.radius.column(n, np.float64), e.end.spread(end[:, 0], n), e.end.spread(end[:, 1], n),
                      e.cutter.column(n, np.float64), surface, tuple(e.rests), tuple(e.stops),
                      _splines(e, tip, place, common), e.unread)

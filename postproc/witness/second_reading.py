@@ -11,15 +11,15 @@ import numpy as np
 
 from postproc.witness.clamps import check_clamps, other_limits
 from postproc.witness.clfile import commanded
-from postproc.witness.commanded import LINE, RAPID, Commanded, tools_of, unit
+from postproc.witness.commanded import LINE, RAPID, Commanded, tools_of, unit, with_spindle
 from postproc.witness.errors import ErrorChain, error_chain
 from postproc.witness.evidence import Aspect, Case, Compared, ExecutedBlocks, Finding, NotCompared, Testimony
 from postproc.witness.machine import ROD, Chain, Rods, kinematics_of, largest_feed, merged
 from postproc.witness.motion import Walked, check_arcs, check_path
-from postproc.witness.place import Cut, Poses, Unplaced, cut_of, placement, zero_of
+from postproc.witness.place import CHUNK, Cut, Poses, Unplaced, cut_of, placement, zero_of
 from postproc.witness.sides import check_sides
 from postproc.witness.splines import check_curves
-from postproc.witness.states import check_feeds, check_holes, check_states, check_velocities, with_spindle
+from postproc.witness.states import check_feeds, check_holes, check_states, check_velocities
 from postproc.witness.stretches import BOTTOM, Targets, is_cut, matched, targets_of, turns_of
 from postproc.witness.text import Array
 from postproc.witness.turning import check_turning
@@ -34,7 +34,7 @@ def testify(case: Case, executed: ExecutedBlocks) -> Testimony:
     """What this witness says of an executed program; it never raises for what it does not understand."""
     began = process_time()
     try:
-        c = with_spindle(commanded(case.cl, case.units, case.dialect, case.cl_lines), case.setup)
+        c = with_spindle(commanded(case.cl(), case.units, case.dialect, case.cl_lines), case.setup)
         place = placement(case.setup, c)
         c = c if case.chosen is None else _reoriented(c, case.chosen)
     except Unplaced as fault:
@@ -119,14 +119,22 @@ def _nothing(why: str, began: float, missing: Sequence[NotCompared] = ()) -> Tes
 def _targets(case: Case, c: Commanded, place: tuple[Array, Array]) -> tuple[Targets, Cut | None]:
     """What the program has to come to, and what is cut, in the table frame."""
     rotation, origin = place
-    turn, same = np.ascontiguousarray(rotation.T), bool((rotation == np.eye(3)).all())
-    tip = c.tip if same and not origin.any() else c.tip @ turn + origin
-    axis = c.axis if same else c.axis @ turn
+    turn = np.ascontiguousarray(rotation.T)
+    tip, axis = _behind_itself(c.tip, turn, origin), _behind_itself(c.axis, turn, np.zeros(3))
     centre, normal = c.centre @ turn + origin, c.normal @ turn
     splines = {row: points @ turn + origin for row, points in c.splines.items()}
     targets = targets_of(c, tip, axis, centre, normal, splines)
-    every = np.concatenate([tip, *splines.values()]) if splines else tip
-    return targets, cut_of(case, c, every, axis, centre, normal, place) if len(targets) else None
+    return targets, cut_of(case, c, tip[1:], axis[1:], centre, normal, splines, place) if len(targets) else None
+
+
+def _behind_itself(values: Array, turn: Array, origin: Array) -> Array:
+    """(N + 1, 3) points or directions (N, 3) turned and moved, and before them the first once more."""
+    result = np.empty((len(values) + 1, 3))
+    for first in range(0, len(values), CHUNK):
+        x, y, z = values[first:first + CHUNK].T[:, :, None]
+        result[first + 1:first + 1 + CHUNK] = x * turn[0] + y * turn[1] + z * turn[2] + origin
+    result[:1] = result[1:2]
+    return result
 
 
 def _compare(case: Case, executed: ExecutedBlocks, c: Commanded, place: tuple[Array, Array], targets: Targets,

@@ -19,6 +19,7 @@ from postproc.witness.commanded import (
     UNKNOWN,
     Commanded,
     WitnessCycle,
+    feeds_of,
     loads,
     registers_of,
     tools_of,
@@ -32,52 +33,13 @@ from postproc.witness.text import Array
 
 ALLOWED, VELOCITY = 1.005, 1.02
 """shares: of a feed, in each move and in all of one feed, besides rounding; of an axis's velocity, by rounded words"""
-_RETRACT = 12
-"""blocks behind the bottom of a hole in which the tool comes to its retract plane"""
 _State = Literal["length", "tool", "spindle", "speed", "coolant"]
 _STATES: dict[_State, tuple[FindingCode, Aspect]] = {
     "length": ("length", "length registers"), "tool": ("tool", "tools"), "spindle": ("spindle", "spindle states"),
     "speed": ("spindle", "spindle states"), "coolant": ("coolant", "coolant states")}
+_RETRACT = 12
+"""blocks behind the bottom of a hole in which the tool comes to its retract plane"""
 _PECKED, _FEED_OUT = ("DEEP", "BRKCHP"), ("BORE", "REAM", "TAP")
-
-
-def with_spindle(c: Commanded, setup: dict[str, Any]) -> Commanded:
-    """With the set-up's spindle where it counts: `[tools.N]` for a tool that no SPINDL record is for,
-    `[output]` where the spindle stands there too, either where no record at all states one, and the speed of
-    either where the file turns the spindle without one."""
-    output = (setup.get("output") or {}).get("spindle")
-    own = {int(n): t["spindle"] for n, t in (setup.get("tools") or {}).items() if (t or {}).get("spindle")}
-    if not len(c) or not (output or own):
-        return c
-    tool, silent = tools_of(c, setup), c.spindle == UNKNOWN
-    begin = loads(tool)
-    others = (c.turned < begin) | ((c.turned == begin) & (c.spindle == 0))
-    known = ~silent & (c.spindle != UNFOLLOWED)
-    spindle, rpm = c.spindle.copy(), c.rpm.copy()
-    for number in np.unique(tool).tolist():
-        wanted, here = own.get(number) or output, tool == number
-        if not wanted:
-            continue
-        none = here & known & np.isnan(c.rpm)
-        taken = here & (silent | (known & others & ((number in own) | (c.spindle == 0) | none)))
-        rpm[taken | none] = wanted["rpm"]
-        spindle[taken] = 1 if wanted["direction"] == "clockwise" else -1
-    return replace(c, spindle=spindle, rpm=rpm)
-
-
-def feeds_of(c: Commanded, setup: dict[str, Any], most: float) -> Array:
-    """(N,) mm/min that the CL file asks for at every position, but taps no more than `most`; NaN where it does not say."""
-    own = np.array([(x.feed, x.per_turn) for x in c.cycles] + [(math.nan, 0.0)], np.float64)
-    hole = c.cycle >= 0
-    feed = np.where(hole, own[c.cycle, 0], c.feed)
-    per_turn = np.where(hole, own[c.cycle, 1] > 0, c.per_turn)
-    tap = np.array([x.kind == "TAP" for x in c.cycles] + [False])[c.cycle]
-    default = (setup.get("output") or {}).get("feed")
-    if default:
-        feed = np.where(np.isnan(feed) & ~c.inverse & ~tap, float(default), feed)
-        per_turn = per_turn & ~(np.isnan(c.feed) & ~hole)
-    feed = np.where(per_turn, feed * c.rpm, np.where(c.inverse & ~hole, math.nan, feed))
-    return np.asarray(np.where(feed > np.where(tap, math.inf, most), most, feed))
 
 
 def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], match: Array) -> tuple[list[Finding], int]:
@@ -86,7 +48,7 @@ def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], matc
     rows = np.flatnonzero(w.inside & (w.code > 0) & ~w.gap & ~w.returns & ((w.kind == LINE) | (w.kind == ARC)) & w.on_path())
     m = len(t)
     seconds = np.bincount(w.owner[rows], weights=w.seconds[rows], minlength=m)[:m]
-    length = apart(t.tip, t.start)
+    length = apart(t.tip, t.start)  # few columns at a time: each is as long as the file
     k = np.flatnonzero(t.sweep != 0.0)
     flat = t.start[k] - t.centre[k]
     rise = np.einsum("ni,ni->n", t.tip[k] - t.start[k], t.normal[k])
@@ -96,37 +58,43 @@ def check_feeds(w: Walked, c: Commanded, case: Case, table: dict[str, Any], matc
     most = largest_feed(table)
     feed = feeds_of(c, case.setup, most)[t.row]
     inverse = c.inverse[t.row] & (t.kind != BOTTOM)
-    asked = np.where(inverse, np.maximum(60.0 / c.feed[t.row], 60.0 * length / most), 60.0 * length / feed)
-    shorter = 0.002 + 4.0 * case.tolerance + np.abs(t.sweep) * case.tolerance
-    slack = shorter * np.where(inverse, asked / np.maximum(length, 1e-3), 60.0 / feed)
+    asked, slack, k = 60.0 * length / feed, 60.0 / feed, np.flatnonzero(inverse)
+    asked[k] = np.maximum(60.0 / c.feed[t.row[k]], 60.0 * length[k] / most)
+    slack[k] = asked[k] / np.maximum(length[k], 1e-3)
+    slack *= 0.002 + 4.0 * case.tolerance + np.abs(t.sweep) * case.tolerance
     check = ((t.kind == LINE) | (t.kind == ARC)) & ~t.gap & ~t.free & (match >= 0) & (seconds > 0.0) & np.isfinite(asked)
-    ratio = asked / np.where(seconds > 0.0, seconds, 1.0)
-    group = _groups(check, np.where(inverse, asked, feed))
-    hurried = w.owner[rows[_fast_blocks(w, rows, asked / np.maximum(length, 1e-9), case.tolerance)]]
+    feed[k] = asked[k]
+    group = _groups(check, feed)
+    pace = np.divide(asked, np.maximum(length, 1e-9), out=length)
+    del feed, length, inverse
+    hurried = w.owner[rows[_fast_blocks(w, rows, pace, case.tolerance)]]
     fast = check & ((seconds * ALLOWED + slack < asked) | (np.bincount(hurried, minlength=m) > 0)
                     | _off_in_all(group, asked, ALLOWED * seconds, slack))
-    found = _feed_finding(w, c, np.flatnonzero(fast), ratio, match)
+    found = _feed_finding(w, c, np.flatnonzero(fast), asked, seconds, match)
     if not case.planned:
         late = check & ((seconds > ALLOWED * asked + slack) | _off_in_all(group, seconds, ALLOWED * asked, slack))
-        needed = np.maximum(asked, _needed(w, rows, np.flatnonzero(late), asked / np.maximum(length, 1e-9), table))
+        needed = np.maximum(asked, _needed(w, rows, np.flatnonzero(late), pace, table))
         slow = late & ((seconds > ALLOWED * needed + slack)
                        | _off_in_all(np.where(late, group, 0), seconds, ALLOWED * needed, slack))
-        found += _feed_finding(w, c, np.flatnonzero(slow), ratio, match)
+        found += _feed_finding(w, c, np.flatnonzero(slow), asked, seconds, match)
     return found, int(check.sum())
 
 
 def _fast_blocks(w: Walked, rows: Array, pace: Array, tolerance: float) -> Array:
     """(K,) True for blocks of cuts whose F word, or whose time, takes the tip farther than `pace` (M,), s/mm, allows."""
-    length = apart(w.tip, w.tip, rows, np.maximum(rows - 1, 0))
-    e, pace = w.poses.executed, pace[w.owner[rows]]
-    straight = ~e.inverse[rows] & (np.abs(w.length[rows] - length) < 1e-4 * length) & (length > 1.0)
-    by_word = straight & ((e.feed[rows] - 0.1) * e.unit[rows] * pace > 60.0 * ALLOWED)
-    return np.asarray(((length - 0.002 - 2.0 * tolerance) * pace > ALLOWED * w.seconds[rows]) | by_word)
+    e, found = w.poses.executed, np.zeros(len(rows), bool)
+    for first in range(0, len(rows), CHUNK):
+        here = rows[first:first + CHUNK]
+        length, most = apart(w.tip, w.tip, here, np.maximum(here - 1, 0)), pace[w.owner[here]]
+        straight = ~e.inverse[here] & (np.abs(w.length[here] - length) < 1e-4 * length) & (length > 1.0)
+        by_word = straight & ((e.feed[here] - 0.1) * e.unit[here] * most > 60.0 * ALLOWED)
+        found[first:first + CHUNK] = ((length - 0.002 - 2.0 * tolerance) * most > ALLOWED * w.seconds[here]) | by_word
+    return found
 
 
 def _groups(check: Array, feed: Array) -> Array:
     """(M,) number of the feed of each target, from 1; 0 for what is not compared."""
-    result = np.zeros(len(feed), np.int64)
+    result = np.zeros(len(feed), np.int32)
     values = feed[check]
     if len(values):
         new = np.flatnonzero(np.append(True, values[1:] != values[:-1]))
@@ -173,7 +141,7 @@ def check_velocities(w: Walked, c: Commanded, table: dict[str, Any]) -> list[Fin
     for first in range(0, len(e), CHUNK):
         rows = np.arange(first, min(first + CHUNK, len(e)))
         rows = rows[(e.code[rows] == 1) & (w.seconds[rows] > 0.0)]
-        needed = (np.abs(e.joints[rows] - w.poses.before(rows)) / speed).max(axis=1)
+        needed = (np.abs(e.joints(rows) - w.poses.before(rows)) / speed).max(axis=1)
         bad += rows[w.seconds[rows] * VELOCITY + 1e-3 < needed].tolist()
     if not bad:
         return []
@@ -182,29 +150,55 @@ def check_velocities(w: Walked, c: Commanded, table: dict[str, Any]) -> list[Fin
     return [Finding("velocity", "the feed asks an axis for more than its velocity", line, int(e.line[bad[0]]), len(bad))]
 
 
-def _feed_finding(w: Walked, c: Commanded, at: Array, ratio: Array, match: Array) -> list[Finding]:
+def _feed_finding(w: Walked, c: Commanded, at: Array, asked: Array, seconds: Array, match: Array) -> list[Finding]:
     if not len(at):
         return []
-    k = at[int(np.abs(np.log(np.maximum(ratio[at], 1e-9))).argmax())]
-    return [Finding("feed", f"the cut runs at {ratio[k]:.3f} times the feed of the CL file", int(c.line[w.targets.row[k]]),
-                    int(w.poses.executed.line[match[k]]), len(at))]
+    ratio = asked[at] / np.where(seconds[at] > 0.0, seconds[at], 1.0)
+    worst = int(np.abs(np.log(np.maximum(ratio, 1e-9))).argmax())
+    k = at[worst]
+    return [Finding("feed", f"the cut runs at {ratio[worst]:.3f} times the feed of the CL file",
+                    int(c.line[w.targets.row[k]]), int(w.poses.executed.line[match[k]]), len(at))]
 
 
 def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], dict[Aspect, int], list[NotCompared]]:
     """Tool, spindle, speed and coolant while cutting; how many blocks each was compared in; what could not be.
 
     Blocks that leave a hole at feed count with the hole; feed moves off the path are linking moves and belong to no cut."""
-    e = w.poses.executed
     cuts = (w.kind == LINE) | (w.kind == ARC) | (w.kind == BOTTOM)
     rows = np.flatnonzero(w.inside & (w.code > 0) & cuts & (w.on_path() | w.gap | w.returns))
-    row = w.targets.row[w.owner[rows] - w.returns[rows]]
-    every = tools_of(c, case.setup)
-    tool, coolant, named = every[row], _coolants(c, case.setup)[row], registers_of(c, every)[row]
+    tool = tools_of(c, case.setup)
+    coolant, loaded = _coolants(c, case.setup), loads(tool)
+    found, counts, silent = dict[_State, Finding](), dict[Aspect, int](), list[NotCompared]()
+    for first in range(0, max(len(rows), 1), CHUNK):
+        here = rows[first:first + CHUNK]
+        row = w.targets.row[w.owner[here] - w.returns[here]]
+        named = registers_of(c, loaded, row)
+        checks, unstated = _states_of(w, c, case, here, row, tool[row], coolant[row], named)
+        for state, text, compared, is_, wanted, good in checks:
+            bad = np.flatnonzero(compared & ~good)
+            code, aspect = _STATES[state]
+            counts[aspect] = counts.get(aspect, 0) + int(compared.sum())
+            if len(bad) and state not in found:
+                k = int(bad[0])
+                found[state] = Finding(code, text.format(_said(state, is_[k]), _said(state, wanted[k])), int(c.line[row[k]]),
+                                       int(w.poses.executed.line[here[k]]), 0)
+            if len(bad):
+                found[state] = replace(found[state], count=found[state].count + len(bad))
+        if unstated.any() and not silent:
+            silent = [NotCompared("spindle", "stated by no record", int(c.line[row[unstated.argmax()]]))]
+    return [found[state] for state in _STATES if state in found], counts, silent
+
+
+def _states_of(w: Walked, c: Commanded, case: Case, rows: Array, row: Array, tool: Array, coolant: Array, named: Array,
+               ) -> tuple[tuple[tuple[_State, str, Array, Array, Array, Array], ...], Array]:
+    """Of blocks that cut, by their rows of the CL file and what stands there: each state with the words of its fault, where
+    it is compared, what it is and should be, where that is so; (K,) True where no record states the spindle."""
+    e, output = w.poses.executed, case.setup.get("output") or {}
     own = np.where(tool >= 0, tool + (register_beyond(case.machine) if case.registers else 0), tool)
     register = np.where((named == OWN) | (named == tool) | (not case.registers), own, named)
-    register = np.where(e.lengthless[rows] | (not (case.setup.get("output") or {}).get("tool_call", True)), -1, register)
+    register = np.where(e.lengthless[rows] | (not output.get("tool_call", True)), -1, register)
     direction, rpm = c.spindle[row], c.rpm[row]
-    if not (case.setup.get("output") or {}).get("tool_call", True):
+    if not output.get("tool_call", True):
         tool = np.full(len(rows), -1)
     tap = np.array([x.kind == "TAP" for x in c.cycles] + [False])[c.cycle[row]]
     flow = e.coolant[rows]
@@ -215,28 +209,18 @@ def check_states(w: Walked, c: Commanded, case: Case) -> tuple[list[Finding], di
     for kind, bits in BITS.items():
         bit = next((b for b in bits if case.coolants & b), 0)
         wet &= (coolant != kind) | ((flow & bit) > 0) | (not bit)
-    checks: tuple[tuple[_State, str, Array, Array, Array, Array], ...] = (
-              ("length", "the length register is {0}, by the CL file it is {1}", tool != UNKNOWN, e.register[rows],
-               register, e.register[rows] == register),
-              ("tool", "the program cuts with {0}, the CL file with {1}", tool != UNKNOWN, e.tool[rows], tool,
-               e.tool[rows] == tool),
-              ("spindle", "the spindle is {0}, the CL file says {1}", stated & ~tap,
-               e.spindle[rows], direction, e.spindle[rows] == direction),
-              ("speed", "the spindle speed is {0}, the CL file says {1}", speed, e.rpm[rows], rpm,
-               np.abs(e.rpm[rows] - rpm) <= 0.5 + 1e-3 * np.abs(rpm)),
-              ("coolant", "the coolant is {0}, the CL file says {1}",
-               (coolant != UNFOLLOWED) & ((coolant != UNKNOWN) | (not some)), flow, coolant, wet))
-    found, counts = [], dict[Aspect, int]()
-    for state, text, compared, is_, wanted, good in checks:
-        bad = np.flatnonzero(compared & ~good)
-        code, aspect = _STATES[state]
-        counts[aspect] = counts.get(aspect, 0) + int(compared.sum())
-        if len(bad):
-            k = int(bad[0])
-            found.append(Finding(code, text.format(_said(state, is_[k]), _said(state, wanted[k])), int(c.line[row[k]]),
-                                 int(e.line[rows[k]]), len(bad)))
-    silent = np.flatnonzero((direction == UNKNOWN) & ~tap)
-    return found, counts, [NotCompared("spindle", "stated by no record", int(c.line[row[silent[0]]]))] if len(silent) else []
+    return ((
+        ("length", "the length register is {0}, by the CL file it is {1}", tool != UNKNOWN, e.register[rows], register,
+         e.register[rows] == register),
+        ("tool", "the program cuts with {0}, the CL file with {1}", tool != UNKNOWN, e.tool[rows], tool,
+         e.tool[rows] == tool),
+        ("spindle", "the spindle is {0}, the CL file says {1}", stated & ~tap, e.spindle[rows], direction,
+         e.spindle[rows] == direction),
+        ("speed", "the spindle speed is {0}, the CL file says {1}", speed, e.rpm[rows], rpm,
+         np.abs(e.rpm[rows] - rpm) <= 0.5 + 1e-3 * np.abs(rpm)),
+        ("coolant", "the coolant is {0}, the CL file says {1}",
+         (coolant != UNFOLLOWED) & ((coolant != UNKNOWN) | (not some)), flow, coolant, wet)),
+        (direction == UNKNOWN) & ~tap)
 
 
 def _coolants(c: Commanded, setup: dict[str, Any]) -> Array:
@@ -245,7 +229,7 @@ def _coolants(c: Commanded, setup: dict[str, Any]) -> Array:
     begin = loads(tool)
     later = np.isin(begin, begin[~silent & (c.flowed >= begin) & (c.coolant != 0)])
     others = ~later & (silent | ((c.flowed < begin) & (c.coolant != UNFOLLOWED)))
-    for number in sorted(set(tool[np.isin(tool, list(own)) | bool(default)].tolist())):
+    for number in np.unique(tool[np.isin(tool, list(own)) | bool(default)]).tolist():
         word = own.get(number) or default
         taken = (tool == number) & ((number in own) | silent | (c.coolant == 0))
         result[taken & others] = {"off": 0, "flood": 1, "mist": 11, "through": 12, "air": 13}.get(str(word), 2)

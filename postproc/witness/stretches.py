@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.witness.commanded import ARC, HOLE, LINE, RAPID, START, Commanded
+from postproc.witness.commanded import ARC, HOLE, LINE, RAPID, START, Commanded, picked
 from postproc.witness.loops import walk
 from postproc.witness.place import Poses
 from postproc.witness.splines import length_of, off_chords
@@ -50,56 +50,54 @@ class Targets:
 
 
 def targets_of(c: Commanded, tip: Array, axis: Array, centre: Array, normal: Array, splines: dict[int, Array]) -> Targets:
-    """The targets of a CL file; `tip`, `axis`, `centre`, `normal`, `splines` are its own in the table frame."""
-    depth = np.array([x.depth for x in c.cycles] + [0.0])[c.cycle]
-    above = np.array([x.clearance for x in c.cycles] + [0.0])[c.cycle]
+    """The targets of a CL file; `tip`, `axis` (N + 1, 3), `centre`, `normal`, `splines` are its own in the table frame; the
+    first tip and axis stands before itself."""
+    (begin, tip), (begin_axis, axis) = (tip[:-1], tip[1:]), (axis[:-1], axis[1:])
+    depth, above, out = (picked(np.array([*values, other]), c.cycle) for values, other in (
+        ([x.depth for x in c.cycles], 0.0), ([x.clearance for x in c.cycles], 0.0),
+        ([np.maximum(x.clearance, x.retract) for x in c.cycles], np.nan)))
     hole = c.kind == HOLE
     plain = hole & ~(np.isfinite(depth) & np.isfinite(above))
     good = c.known & ~plain & (c.kind != START)
-    count = np.where(good, np.where(hole, 2, 1), 0)
-    row = np.repeat(np.arange(len(c)), count)
+    row = np.repeat(np.arange(len(c), dtype=np.int32), good * (1 + hole.astype(np.int8)))
     second = np.zeros(len(row), bool)
     second[1:] = (row[1:] == row[:-1])
     on_hole = hole[row]
     kind = np.where(on_hole, np.where(second, BOTTOM, ENTER), c.kind[row]).astype(np.int8)
-    lift = np.where(on_hole, np.where(second, -depth[row], above[row]), 0.0)
     before = np.maximum(row - 1, 0)
     if len(row) == len(c) and not on_hole.any():  # one behind the other: where each begins is where the last one ended
-        (start, there), (start_axis, along) = (_and_before(v) for v in (tip, axis))
+        start, there, start_axis, along = begin, tip, begin_axis, axis
     else:
+        lift = np.where(on_hole, np.where(second, -depth[row], above[row]), 0.0)
         there, along = tip[row] + lift[:, None] * axis[row], axis[row]
         start, start_axis = tip[before], axis[before]
     free = (row == 0) | ~c.known[before] | hole[before] | on_hole
     # A cut behind a hole begins where the tool has left it to, where the record says where that is.
-    out = np.array([np.maximum(x.clearance, x.retract) for x in c.cycles] + [np.nan])[c.cycle]
     left = np.flatnonzero((row > 0) & is_cut(kind) & ~on_hole & good[before] & hole[before] & np.isfinite(out[before]))
     if len(left):
         start[left] += out[before[left], None] * start_axis[left]
     free[left] = False
     if on_hole.any():
         start[second], start_axis[second], free = there[np.flatnonzero(second) - 1], axis[row[second]], free & ~second
-    lost = np.concatenate([[0], np.cumsum(~good & (c.kind != START))])
+    del before
+    lost = np.concatenate([np.zeros(1, np.int32), np.cumsum(~good & (c.kind != START), dtype=np.int32)])
     skipped = np.zeros(len(row), bool)
     if len(row):
         skipped[1:] = lost[row[1:]] != lost[row[:-1] + 1]
         skipped[0] = lost[row[0]] > 0
-    arc = c.arc[row]
-    round_ = (kind == ARC) & (arc >= 0)
+    round_ = (kind == ARC) & (c.arc[row] >= 0)
     mid, about, sweep = (np.broadcast_to(0.0, (len(row), *size)) for size in ((3,), (3,), ()))
     if round_.any():
         mid, about, sweep = mid.copy(), about.copy(), sweep.copy()
-        mid[round_], about[round_], sweep[round_] = centre[arc[round_]], normal[arc[round_]], c.sweep[arc[round_]]
+        arc = c.arc[row[round_]]
+        mid[round_], about[round_], sweep[round_] = centre[arc], normal[arc], c.sweep[arc]
     skipped &= ~second
     gap = c.gap[row] | skipped
-    return Targets(there, along, kind, row, start, start_axis, free, gap, skipped, mid, about, np.where(gap, 0.0, sweep),
-                   np.where(second, depth[row] + out[row], np.nan),
+    if round_.any():
+        sweep[gap] = 0.0
+    left = np.where(second, depth[row] + out[row], np.nan) if second.any() else np.broadcast_to(np.nan, len(row))
+    return Targets(there, along, kind, row, start, start_axis, free, gap, skipped, mid, about, sweep, left,
                    {int(k): splines[int(row[k])] for k in np.flatnonzero(np.isin(row, list(splines)))} if splines else {})
-
-
-def _and_before(values: Array) -> tuple[Array, Array]:
-    """(rows before, rows) of values (N, 3), which are held once; before the first stands itself."""
-    both = np.concatenate([values[:1], values])
-    return both[:-1], both[1:]
 
 
 def matched(targets: Targets, tip: Array, axis: Array, turns: Array, tolerance: float,
@@ -113,7 +111,7 @@ def matched(targets: Targets, tip: Array, axis: Array, turns: Array, tolerance: 
     match = walk(tip, axis, turns, targets.tip, targets.axis, targets.sweep, around, targets.skipped, least,
                  (tolerance, axis_tolerance))
     reached = match[:int(np.argmax(match < 0))] if (match < 0).any() else match
-    return match, np.searchsorted(reached, np.arange(len(tip)), side="left")
+    return match, np.searchsorted(reached, np.arange(len(tip)), side="left").astype(np.int32)
 
 
 def turns_of(poses: Poses) -> Array:

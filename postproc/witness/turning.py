@@ -30,7 +30,7 @@ def check_turning(case: Case, executed: ExecutedBlocks) -> tuple[list[Finding], 
         line = np.searchsorted(ends, [at for at, _, _ in words]) + 1
         value = np.array([number for _, _, number in words], dtype=np.float64)
         row = np.searchsorted(executed.line, line, side="right") - 1
-        moved = np.degrees(np.diff(executed.joints[row, executed.letters.index(letter)]))
+        moved = np.degrees(np.diff(executed.joints(row)[:, executed.letters.index(letter)]))
         wanted = _steps(value, np.array([how or b"" for _, how, _ in words]), rule)
         known = (executed.line[row[1:]] == line[1:]) & (executed.line[row[:-1]] == line[:-1])
         bad = np.flatnonzero(known & (np.abs(moved - wanted) > _NEAR))

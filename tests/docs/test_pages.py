@@ -23,7 +23,7 @@ from postproc.page import what_if
 from postproc.setup.model import load_setup
 from tests.docs.page import PLAIN, ROOT, blocks
 from tests.docs.page import faults as faults_of
-from tests.hints.test_hints_obeyed import FEW_PLACES
+from tests.hints.test_hints_obeyed import FEW_PLACES, FEW_ROUNDS
 from toolpaths.plug_ins import PlugInGroup
 
 PAGES = sorted(p for p in (ROOT / "docs").rglob("*.md") if "generated" not in p.parts and p.name != "python.md")
@@ -42,6 +42,8 @@ def test_a_page_does_what_it_says(page: Path, tmp_path: Path, monkeypatch: pytes
     monkeypatch.setattr(what_if, "EXECUTED_MOST", 1)  # limits that a report of an executed control tries
     for name, value in FEW_PLACES.items():
         monkeypatch.setattr(f"machines.analysis.{name}", value)
+    for name, value in FEW_ROUNDS.items():
+        monkeypatch.setattr(f"postproc.time_fit.{name}", value)
     assert faults_of(page, tmp_path) == []
 
 

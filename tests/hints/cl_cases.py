@@ -33,6 +33,7 @@ _ROWS = [  # code, records as found, as the hint has them, word of the hint
     ("cl.feed", "FEDRAT/MMPM", "FEDRAT/MMPM,250.0", "FEDRAT/MMPM,250.0"),
     ("cl.feed", "FEDRAT/MMPM,0", "FEDRAT/MMPM,60", "a feed above 0"),
     ("cl.feed", "FEDRAT/MMPM,0", "FEDRAT/MMPM,0\nRAPID", "RAPID where it cuts none"),
+    ("cl.feed", "FEDRAT/MPM,250", "FEDRAT/MMPM,250", "write the feed in MMPM"),
     ("cl.feed", "FEDRAT/INVERS", "FEDRAT/INVERS,2.5", "INVERS,2.5"),
     ("cl.frame", f"MSYS/0,0,0,{AXES},1", f"MSYS/0,0,0,{AXES}", "9 numbers"),
     ("cl.frame", "MSYS/0,0,0,2,0,0,0,1,0", f"MSYS/0,0,0,{AXES}", "of length 1"),

@@ -274,6 +274,10 @@ MACHINE = [
           'assumed = ["travel", "acceleration", ', ('["travel", ', "[")),
     _case("machine.plausible", "mm/min and deg/min are (divided) by 60", MILL, "velocity = 500", "velocity = 30000",
           ("velocity = 30000", "velocity = 500")),
+    _case("machine.plausible", r"the middle of the workspace is at X ([\d.]+) mm", "delta-star", "home = 1346.997",
+          "home = 800", ("home = 800", r"home = \1")),
+    _case("machine.plausible", r"the workspace takes X ([\d.]+) mm to ([\d.]+) mm", "delta-star", "travel = [780, 1620]",
+          "travel = [1200, 1400]", ("travel = [1200, 1400]", r"travel = [\1, \2]")),
     HintCase(
         "sheet.figure",
         "machine new s.toml -o m.toml",

@@ -131,11 +131,16 @@ def _smooth(control: str, old: str, new: str, says: str, asked: str = "") -> Hin
 LEVELS_3 = "UNITS/MM\n" + "".join(
     f"TOOL PATH/{name},TOOL,T1\nMSYS/0,0,0,1,0,0,0,1,0\nLOAD/TOOL,1\n{SPOKEN}\nFEDRAT/MMPM,600\n{CUT}END-OF-PATH\n"
     for name in ("ROUGH", "FINE"))
+_FINE = "-m mill-3axis -c linuxcnc --setup s.toml"
 _SMOOTHING = [
     HintCase("setup.smoothing", "convert part.cls -m mill-3axis -c fanuc-30i --setup s.toml -o p.nc",
              {"part.cls": LEVELS_3, "s.toml": LENGTH + ALONE % "0.0001"}, "(0.002) mm, or a level",
              (sheet("0.0001", r"\1"),)),
     _smooth("linuxcnc", "G64 P0.002", "G64 P0.5", "G64 P Q as the post writes it"),
+    HintCase("verify.smoothing", f"verify p.nc part.cls {_FINE}", {"part.cls": LEVELS_3, "s.toml": LENGTH},
+             "verify with (--tolerance 0.05), which the program was converted with",
+             (option(r" \1", ""), Edit("p.nc", "", "")),
+             first=(f"convert part.cls {_FINE} -o p.nc --tolerance 0.05",)),
     _smooth("fanuc-30i", "G05.1 Q1 R10", "G05.1 Q1 R9", "G05.1 Q1 as the post writes it", '"finishing"'),
     _smooth("haas-ngc", "E0.003", "E0.5", "G187 E as the post writes it"),
     _smooth("heidenhain-tnc640", "32.1 T0.003", "32.1 T0.5", "CYCL DEF 32.1 T and 32.2 TA as the post writes them"),

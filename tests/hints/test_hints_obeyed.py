@@ -26,8 +26,8 @@ EXPLAINED = tomllib.loads((DATA / "codes.toml").read_text("utf-8"))
 """messages and remedies by code; `tests/postproc/explain` compares them with the source"""
 VERDICTS = frozenset({"do not run this program"})
 """what is said of a program that is wrong: no remedy, the fault is in the project or in what others have edited"""
-LOOKED_AT = frozenset({"tool-table.outside", "witness.failed"})
-"""codes of how far lengths of tools may be off, and of the second witness (`tests/margins.py`)"""
+LOOKED_AT = frozenset({"tool-table.outside", "verify.no_bound", "witness.failed"})
+"""codes of how far lengths of tools may be off, of bounds between places, and of the second witness (`tests/margins.py`)"""
 NOTHING = "nothing is to be done"
 """how a hint begins that only says what was taken and why that is right: no remedy"""
 
@@ -35,6 +35,8 @@ NOTHING = "nothing is to be done"
 FEW_PLACES = {"report.GRID": (3, 3, 3, 2), "report.COARSE": (2, 2, 2, 2), "extremes.MOST": 20, "extremes.START": 20,
               "transmission.ROUNDS": 2, "box.POINTS": 3, "box.STEPS": 16}
 """where a machine is analysed"""
+FEW_ROUNDS = {"executed_fit.ROUNDS": 1, "executed_fit.HALVINGS": 1, "candidate_moves.FEEDS": (1000.0,)}
+"""where the model of a control is fitted, and a test for it planned"""
 
 
 def remedies(hints: list[str]) -> list[str]:
@@ -53,6 +55,8 @@ def few_places() -> Iterator[None]:
             patch.setattr(f"machines.analysis.certify.{name}", 500)
         for name, value in FEW_PLACES.items():
             patch.setattr(f"machines.analysis.{name}", value)
+        for name, value in FEW_ROUNDS.items():
+            patch.setattr(f"postproc.time_fit.{name}", value)
         for name, value in (("RESTARTS", 1), ("ROUNDS", 12), ("CROWD", 6), ("GRID", (3, 3, 2))):
             patch.setattr(layouts, name, value)
         yield

@@ -1,6 +1,7 @@
 """Where figures of machine files come from: a document, or assumed; what a file states itself is its own."""
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +37,18 @@ def test_every_figure_is_sourced_or_assumed_and_plausible(name: str) -> None:
     machine = machines.load(name)
     assert unsaid(machine) == []
     assert list(implausible(machine)) == []
+
+
+def test_a_workspace_is_held_against_home_and_travel() -> None:
+    """Warned of: it was found where a file was converted, or a proof of the workspace asked for."""
+    good = machines.load("delta-star")
+    high = good.limits.upper.copy()
+    high[1] = good.home[1] + 10.0
+    short = replace(good, limits=replace(good.limits, upper=high))
+    assert [(p.path, "Y stands at" in p.message) for p in implausible(short)] == [(("axes", "Y", "travel"), True)]
+    away = replace(good, home=good.home - 600.0)
+    found = [p.path for p in implausible(away) if p.message.startswith("home is outside the workspace")]
+    assert found == [("axes", "X", "home")]
 
 
 @pytest.mark.parametrize("name", machines.catalogued())

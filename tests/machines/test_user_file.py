@@ -164,8 +164,17 @@ def test_origin_of_each_value_through_a_base(tmp_path):
 
 def test_a_fault_in_the_base_names_the_base_file(tmp_path):
     base = write(tmp_path, GOOD.replace("500", "0"), "base.toml")
-    d = only(tmp_path, 'base = "small"\n', small=base)
+    d = only(tmp_path, 'base = "base.toml"\n')
     assert (d.file, d.lines) == (str(base), (5,))
+
+
+def test_a_fault_of_a_built_in_base_is_that_of_the_file_that_takes_it(tmp_path):
+    base = write(tmp_path, GOOD.replace("500", "0"), "base.toml")
+    write(tmp_path, 'base = "small"\n', "between.toml")
+    for first, where in (("small", "m.toml"), ("between.toml", "between.toml")):
+        d = only(tmp_path, f'# a file\nbase = "{first}"\n', small=base)
+        assert (Path(d.file).name, d.lines) == (where, (2 if where == "m.toml" else 1,))
+        assert d.message.endswith("(axes.X.velocity is that of base base, line 5)")
 
 
 def test_base_may_be_a_file_next_to_this_one(tmp_path):

@@ -9,7 +9,7 @@ from dataclasses import replace
 from toolpaths.choices import CycleKind
 from toolpaths.cl.build import Heights, ToolpathBuilder
 from toolpaths.cl.cycle_words import KINDS, CycleValues, StatedValues, kind_of, values
-from toolpaths.cl.feeds import feed_in, stated_in
+from toolpaths.cl.feeds import checked_speed, feed_in, stated_in
 from toolpaths.cl.text.dialects import Planes
 from toolpaths.cl.text.statements import Statement, Word
 from toolpaths.toolpath import Cycle, FeedMode
@@ -172,6 +172,7 @@ def _cycle_feed(b: ToolpathBuilder, v: CycleValues) -> tuple[float, FeedMode, fl
         return pitch, FeedMode.PER_REVOLUTION, pitch
     if v.feed is not None:
         stated_in(b, f"CYCLE/{v.kind}", v.feed[1])
+        checked_speed(b, f"CYCLE/{v.kind}", v.feed[1], v.feed[0])
         feed, mode = feed_in(*v.feed, b.scale)
         return feed, mode, feed if v.kind == "TAP" and mode is FeedMode.PER_REVOLUTION and pitch is None else pitch
     if v.kind == "TAP" and pitch is not None:
@@ -211,7 +212,7 @@ def _rest(b: ToolpathBuilder, v: CycleValues, value: float) -> float:
 
 
 def _made(b: ToolpathBuilder, v: CycleValues) -> Cycle:
-    if math.isnan(v.clearance) and v.placed:
+    if math.isnan(v.clearance) and v.placed and b.dialect.cycles_by_table:
         b.log.warning("cl.cycle-start", f"CYCLE/{v.kind} states no start plane, the point of the GOTO is taken", b.line,
                       "state one in the table of the CAM system if the point touches the part")
         v = replace(v, clearance=0.0)

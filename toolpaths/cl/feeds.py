@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from toolpaths.arrays import Floats
 from toolpaths.cl.build import ToolpathBuilder
 from toolpaths.cl.text.statements import Statement, Word
@@ -19,6 +21,8 @@ UNITS = frozenset(PER_MINUTE) | frozenset(PER_SECOND) | frozenset(PER_REVOLUTION
 """NaN: the unit of the part."""
 _ALIKE = (("MMPM", "MPM", "MMPS"), ("IPM", "FPM", "IPS"))
 """Units that are one letter apart: a file keeps to one of them, and a byte that is lost or changed makes another."""
+FASTEST = 1000.0
+"""mm/s (60 m/min): beyond it nobody cuts, and a feed in a unit one letter apart from the usual one is that one damaged"""
 _CHANGING = ("SCALE", "LENGTH", "LOCK", "MAXIPM")
 """Words of FEDRAT (NCL) that change the feed of the moves behind them."""
 _MODIFIERS = (*_CHANGING, "MAXRPM", "OVPLOT")
@@ -41,9 +45,17 @@ def unit_of(words: tuple[Word, ...]) -> str:
     return next((w for w in words if isinstance(w, str) and w in UNITS), "")
 
 
+def checked_speed(b: ToolpathBuilder, record: str, unit: str, value: float) -> None:
+    """Refuse a feed in a unit of seconds or a long one in which it is faster than anybody cuts: a letter of the usual unit
+    is lost. Text of our own writer takes for each feed the unit in which it reads back to the bit."""
+    usual = next((units[0] for units in _ALIKE if unit in units[1:]), "")
+    if usual and not b.declared and (speed := feed_in(value, unit, 1.0)[0]) > FASTEST:
+        b.log.error("cl.feed", f"{record}: {value:g} {unit} are {speed * MINUTE:g} mm/min, faster than anybody cuts", b.line,
+                    f"write the feed in {usual}, which is one letter apart, or below {FASTEST * MINUTE:g} mm/min", key=unit)
+
+
 def stated_in(b: ToolpathBuilder, record: str, unit: str) -> None:
-    """Refuse a unit that is one letter apart from that of other feeds of the file, once; text of our own writer takes for
-    each feed the unit in which it reads back to the bit."""
+    """Refuse a unit that is one letter apart from that of other feeds of the file, once; text of our own writer as above."""
     if unit in b.feed_units or b.declared:
         return
     for alike in _ALIKE:
@@ -78,8 +90,10 @@ def fedrat(b: ToolpathBuilder, s: Statement) -> None:
         b.log.warning("cl.feed-option", f"FEDRAT/{s.body}: only the feed itself is used", b.line)
     unit = unit_of(s.words)
     value = s.after(unit)
+    value = numbers[0] if value is None else value
     stated_in(b, f"FEDRAT/{s.body}", unit)
-    b.feed.set(b.row, feed_in(numbers[0] if value is None else value, unit, b.scale))
+    checked_speed(b, "FEDRAT", unit, value)
+    b.feed.set(b.row, feed_in(value, unit, b.scale))
 
 
 def many(b: ToolpathBuilder, s: Statement, numbers: Floats) -> None:
@@ -87,6 +101,10 @@ def many(b: ToolpathBuilder, s: Statement, numbers: Floats) -> None:
     unit, at = unit_of(s.words), b.index
     feeds = [feed_in(number, unit, b.scale) for number in numbers.tolist()]
     stated_in(b, f"FEDRAT/{s.body}", unit)
+    for k in np.flatnonzero([feed > FASTEST for feed, _ in feeds]).tolist():
+        b.line = b.program.lines[at + k]
+        checked_speed(b, "FEDRAT", unit, float(numbers[k]))
+    b.line = b.program.lines[at]
     for before, feed in zip(b.program.before[at:at + len(numbers)], feeds, strict=True):
         b.row += before - b.fast
         b.fast = before

@@ -251,14 +251,16 @@ def _words_fault(s: Statement, form: RecordForm, allow: frozenset[str]) -> str:
 
 
 def _split_word(s: Statement, form: RecordForm) -> str:
-    """A word with a comma or a blank in it, a number with a blank: GOTO and CYCLE alone have numbers without commas."""
+    """A word with a comma or a blank in it, a number with a blank: GOTO and CYCLE alone have numbers without any comma, and
+    the cycles of `.clt`, with G98 or G99, two planes with a blank between."""
     words = [w for w in s.words if isinstance(w, str) and w and w[0].isalpha()]
     for a, b in pairwise(words):
         if a not in form.words or b not in form.words:
             whole = a + b if a + b in form.words else nearest(a + b, sorted(form.words))
             if whole:
                 return f"{a} {b}: {whole} is cut in two"
-    if s.major != "CYCLE" and any(_TWO_NUMBERS.search(part) for part in s.body.split(",")):
+    free = s.major == "CYCLE" and ("," not in s.body.partition(",")[2] or "G98" in s.words or "G99" in s.words)
+    if not free and any(_TWO_NUMBERS.search(part) for part in s.body.split(",")):
         return "a blank between two numbers"
     return ""
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from toolpaths.aside import aside
 from toolpaths.choices import CubicPieces, DialectName, LengthUnit, ShopName
 from toolpaths.cl.assemble import assemble
 from toolpaths.cl.build import ToolpathBuilder
@@ -125,7 +126,7 @@ def read_bytes(data: bytes | str, *, file: str = "", units: LengthUnit | None = 
         return _refused(file, "no line of it is a record of APT text, and it is no form of a CAM system that is read", APT)
     diagnostics = _of_turning([op.turning for op in toolpath.operations], log)
     read = replace(_with_faults(toolpath, diagnostics), records=records)
-    source = ClSource(raw, units or "", built_in or "") if shop is None else shop.source(raw, units)
+    source = ClSource(aside(raw), units or "", built_in or "") if shop is None else shop.source(raw, units)
     object.__setattr__(read, "source", source)
     return ReadResult(read, diagnostics, counts, found.name, said.evidence,
                       b.arc_records, b.cycle_records, said.lines)

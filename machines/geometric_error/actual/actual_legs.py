@@ -137,7 +137,8 @@ class ActualLegs(Actual):
         """Nominal (place (N, 3), turn (N, 3, 3)) of the platform seen from the carriers, and joints (N, J)."""
         kin, q, (tip, axis, spin) = self.kinematics, self.joints(w), self._pose(w)
         if kin.loops.holds is not None:
-            return *kin.standing(tip, axis, kin.gauge - kin.tool_length * UP, spin)[:2], q
+            given = q[:, kin.carriers_at] if kin.carried_twice else None
+            return *kin.standing(tip, axis, kin.gauge - kin.tool_length * UP, spin, given)[:2], q
         turn = kin.turn_of(axis, spin)
         shift = q[:, kin.carriers_at] @ kin.carriers
         return tip + kin.tool_length * axis - turn @ kin.gauge - shift, turn, q

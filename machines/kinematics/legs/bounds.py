@@ -9,10 +9,12 @@ three times:
     r.v' + (b x r).w'  = -r'.r' + l'.l' - r.(w x (w x b)) + r.A''
     r.v'' + (b x r).w'' = -3 r'.r'' - r.(2 w' x (w x b) + w x (w' x b) + w x (w x (w x b))) + r.A'''
 
-linear systems with the matrix Jx at each order; what holds a platform besides adds its rows (`holds.py`). Over the whole
+linear systems with the matrix Jx at each order; what holds a platform besides adds its rows (`holds.py`), ends of rods that
+go round on rings their part of b' and of the right sides (`ring_ends.py`). Over the whole
 move the right sides are bounded by norms; Jx differs from its value in the middle by at most what its rows can change in
-half the move, which bounds its least singular value from below (Weyl). The bounds assume a largest |r'|, |w| and |v|, and
-hold if they come out smaller: by continuity no rod can then leave them.
+half the move, which bounds its least singular value from below (Weyl). The bound assumes a largest (v'', w''), which with
+(v, w) and (v', w') in the middle bounds these over the whole move, and holds if it comes out smaller: by continuity no
+platform can then leave it.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ import numpy as np
 from machines.kinematics import columns
 from machines.kinematics.holds import Holds
 from machines.kinematics.legs.loops import Loops
+from machines.kinematics.legs.ring_ends import EndsOnRings
 from machines.kinematics.rod_loops import UNBOUNDED
 from machines.kinematics.sliders import solved
 from machines.kinematics.taylor import TaylorAngle, TaylorVector
@@ -108,17 +111,24 @@ class MovingLoops:
         first = self._solved(self.loops.driven(drives.gains(r, self.q) * s))
         v, w = first[:, None, :3], first[:, None, 3:]
         turns = cross(w, b)
-        rod_rates = v + turns - moved
+        rod_rates = v + turns - moved + (0.0 if self._rings is None else self._rings.moved(first))
         curved = np.where(drives.arm, s * s, 0.0)[:, :, None] * -self._drive_arms
         held = None if self.loops.holds is None else -self.loops.holds.bent(self.place, self.turn, first)
-        second = self._solved(self.loops.driven(
-            (drives.stretch * s) ** 2 - dot(rod_rates, rod_rates) + dot(r, curved - cross(w, turns)), held))
-        spin, bend, third = self._bounds(lengths(rod_rates), lengths(first[:, 3:]), lengths(first[:, :3]))
+        right = (drives.stretch * s) ** 2 - dot(rod_rates, rod_rates) + dot(r, curved - cross(w, turns))
+        second = self._solved(self.loops.driven(right if self._rings is None else right + self._rings.bent(r, first), held))
+        spin, bend, third = self._bounds(lengths(rod_rates), first, second)
         return PlatformJets(self.place, self.turn, first, second, spin, bend, third, self._lever)
 
     @cached_property
     def _arms(self) -> Floats:
-        return self.loops.arms(self.turn)
+        return self.loops.arms_at(self.place, self.turn)
+
+    @cached_property
+    def _rings(self) -> EndsOnRings | None:
+        if self.loops.rings is None:
+            return None
+        away = self.loops.drives.points - self.place[:, None]
+        return EndsOnRings(self.loops.rings, away, self.turn[:, :, 2], self.loops.arms(self.turn))
 
     @cached_property
     def _rods(self) -> Floats:
@@ -146,8 +156,9 @@ class MovingLoops:
 
     @cached_property
     def _reach(self) -> Floats:
-        """(K,) mm: |b|, 0 of a platform that does not turn."""
-        return np.asarray(lengths(self.loops.joints) * bool(self.loops.turns), dtype=np.float64)
+        """(K,) mm: |b| at most, 0 of a platform that does not turn."""
+        b, rings = self.loops.joints, 0.0 if self.loops.rings is None else self.loops.rings
+        return np.asarray(np.hypot(np.hypot(b[:, 0], b[:, 1]) + rings, b[:, 2]) * bool(self.loops.turns), dtype=np.float64)
 
     @cached_property
     def _longest(self) -> Floats:
@@ -162,44 +173,41 @@ class MovingLoops:
         arm = np.where(drives.arm, drives.size, 0.0)
         return drives.stretch * s, arm * s**2, arm * s**3
 
-    def _bounds(self, rod_speed: Floats, rate: Floats, speed_of_place: Floats) -> tuple[Floats, Floats, Floats]:
-        """Bounds (N,) of |w|, |w'| and |(v'', lever w'')| from |r'| (N, K), |w| (N,) and |v| (N,) in the middle; UNBOUNDED
-        where none."""
-        lever, speed, spin, pace = self._lever, rod_speed * _GROWTH, rate * _GROWTH, speed_of_place * _GROWTH
+    def _bounds(self, rod_speed: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats, Floats]:
+        """Bounds (N,) of |w|, |w'| and |(v'', lever w'')| from |r'| (N, K), the twist (N, 6) and its derivative in the
+        middle; UNBOUNDED where none."""
+        lever = self._lever
+        spin, pace = lengths(first[:, 3:]), lengths(first[:, :3])
+        bend = np.hypot(lengths(second[:, :3]), lever * lengths(second[:, 3:]) if self.loops.turns else 0.0)
         least = np.linalg.svd(np.nan_to_num(self._jx), compute_uv=False)[:, -1]
-        result = np.full((3, len(rate)), UNBOUNDED)
+        result, assumed = np.full((3, len(first)), UNBOUNDED), np.zeros(len(first))
         for _ in range(_ROUNDS):
-            held = None if self.loops.holds is None else HeldBounds(
-                self.loops.holds, self.loops.weight, self.loops.holds.reach(self.place), pace, spin, lever)
-            bend, rod_bend, grip = self._second(speed, spin, least, held)
-            new_speed, new_spin = rod_speed + 0.5 * rod_bend, rate + 0.5 * bend / lever
-            new_pace = speed_of_place + 0.5 * bend
-            third = self._third(speed, spin, bend, rod_bend, grip, held)
-            good = (new_speed <= speed).all(axis=1) & (new_spin <= spin) & (third < result[2])
-            good &= True if held is None else new_pace <= pace
-            result[:, good] = np.stack([spin, bend / lever, third])[:, good]
-            speed, spin, pace = new_speed * _GROWTH, new_spin * _GROWTH, new_pace * _GROWTH
+            most = bend + 0.5 * assumed
+            spun, paced = spin + 0.5 * most / lever, pace + 0.5 * most
+            third = self._third(rod_speed, first, (spun, paced, most), least)
+            good = (third <= assumed) & (third < result[2])
+            result[:, good] = np.stack([spun, most / lever, third])[:, good]
+            assumed = third * _GROWTH
         return result[0], result[1], result[2]
 
-    def _second(self, speed: Floats, spin: Floats, least: Floats,
-                held: HeldBounds | None) -> tuple[Floats, Floats, Floats]:
-        """(|(v', lever w')| (N,), |r''| (N, K), 1 / least singular value of Jx (N,)) at most while |r'| <= speed (N, K) and
-        |w| <= spin (N,); NaN where Jx might become singular."""
-        reach, longest, lever, t = self._reach, self._longest, self._lever, spin[:, None]
-        stretch, curved, _ = self._drive
-        rows = (np.hypot(speed, reach * (speed + t * longest) / lever) ** 2).sum(axis=1)
-        left = least - 0.5 * np.sqrt(rows if held is None else rows + held.rows())
-        grip = 1.0 / np.where(left > 0.0, left, np.nan)
-        right = ((speed**2 + stretch**2 + longest * (t**2 * reach + curved)) ** 2).sum(axis=1)
-        bend = grip * np.sqrt(right if held is None else right + held.second())
-        return bend, bend[:, None] * np.hypot(1.0, reach / lever) + t**2 * reach + curved, grip
-
-    def _third(self, speed: Floats, spin: Floats, bend: Floats, rod_bend: Floats, grip: Floats,
-               held: HeldBounds | None) -> Floats:
-        """Bound (N,) of |(v'', lever w'')|."""
-        turning = (3.0 * spin * bend / self._lever + spin**3)[:, None] * self._reach
-        right = ((3.0 * speed * rod_bend + self._longest * (turning + self._drive[2])) ** 2).sum(axis=1)
-        return np.asarray(grip * np.sqrt(right if held is None else right + held.third(bend)), dtype=np.float64)
+    def _third(self, rod_speed: Floats, first: Floats, most: tuple[Floats, Floats, Floats], least: Floats) -> Floats:
+        """Bound (N,) of |(v'', lever w'')| while |w|, |v| and |(v', lever w')| are at `most`, each (N,); NaN where Jx might
+        become singular."""
+        (spin, pace, bend), reach, longest, lever = most, self._reach, self._longest, self._lever
+        t, (_, curved, sharp) = spin[:, None], self._drive
+        rod_bend, arms = bend[:, None] * np.hypot(1.0, reach / lever) + t**2 * reach + curved, t * reach
+        turning = (3.0 * spin * bend / lever + spin**3)[:, None] * reach + sharp
+        if self._rings is not None:
+            ends = self._rings.at_most(first, spin, longest + reach, bend, lever)
+            rod_bend, arms, turning = rod_bend + ends.bent, arms + ends.moved, turning + ends.third
+        speed = rod_speed + 0.5 * rod_bend
+        rows = (np.hypot(speed, (reach * speed + arms * longest) / lever) ** 2).sum(axis=1)
+        right = ((3.0 * speed * rod_bend + longest * turning) ** 2).sum(axis=1)
+        if self.loops.holds is not None:
+            held = HeldBounds(self.loops.holds, self.loops.weight, self.loops.holds.reach(self.place), pace, spin, lever)
+            rows, right = rows + held.rows(), right + held.third(bend)
+        left = least - 0.5 * np.sqrt(rows)
+        return np.asarray(np.sqrt(right) / np.where(left > 0.0, left, np.nan), dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -231,11 +239,6 @@ class HeldBounds:
         t, v, of = self.spin[:, None], self.pace[:, None], self.holds.travels
         moments = (self._farthest * t + of * v) / self.lever
         return np.asarray(self.weight**2 * (moments**2 + of * t**2).sum(axis=1), dtype=np.float64)
-
-    def second(self) -> Floats:
-        """(N,) square of the right sides of second order (`Holds.bent`)."""
-        t, v, of = self.spin[:, None], self.pace[:, None], self.holds.travels
-        return np.asarray(self.weight**2 * ((self._farthest * t**2 + 2.0 * of * v * t) ** 2).sum(axis=1), dtype=np.float64)
 
     def third(self, bend: Floats) -> Floats:
         """(N,) square of those of third order: a (3 w w' + w^3), of planes of the platform 3 v' w + 3 v (w' + w^2) more;

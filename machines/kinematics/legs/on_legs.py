@@ -18,6 +18,7 @@ from machines.kinematics.leg_geometry import LegGeometry, pairs_of
 from machines.kinematics.leg_motion import LegMotion, LegParts
 from machines.kinematics.legs.attitudes import attitude, tilt_of
 from machines.kinematics.legs.bounds import MovingLoops, PlatformJets
+from machines.kinematics.legs.modes import found_modes, in_order
 from machines.kinematics.legs.motion import leg_motion
 from machines.kinematics.legs.over_workspace import OverWorkspace
 from machines.kinematics.legs.poses import UP
@@ -51,10 +52,6 @@ class OnLegs(RedundantLegs):
 
     jets_proved = True
 
-    def __post_init__(self) -> None:
-        if self.loops.rings is not None:  # their nearest points move on the platform
-            object.__setattr__(self, "jets_proved", False)
-
     @property
     def leg_geometry(self) -> LegGeometry:
         """See the base class."""
@@ -83,6 +80,26 @@ class OnLegs(RedundantLegs):
         return self
 
     # ---- assembly modes ------------------------------------------------------------------------------------
+
+    def assembly_modes(self, q: Floats) -> tuple[Floats, Floats]:
+        """See the base class: both of a platform that does not turn, up to 8 of one turn; of others those that are found
+        (`modes.py`)."""
+        q = as_points(q, self.joints, "q")
+        if (one := self.one_turn) is not None:
+            poses = [(p, one.turn(p[:, 3])) for p in one.modes(q[:, self.legs_at])]
+            return (np.stack([self._tip(p[:, :3], turn, q) for p, turn in poses]),
+                    np.stack([np.where(np.isnan(p[:, :1]), np.nan, turn[:, :, 2]) for p, turn in poses]))
+        if not self.loops.closed_form:
+            return self._found_modes(q)
+        tip = np.stack([self._tip(place, None, q) for place in self._modes(q)])
+        return tip, np.where(np.isnan(tip), np.nan, UP)
+
+    def _found_modes(self, q: Floats) -> tuple[Floats, Floats]:
+        found = []
+        for row in q:
+            place, turn = found_modes(self.loops, row[self.legs_at], self.home[0])
+            found.append(np.hstack([self._tip(place, turn, np.tile(row, (len(place), 1))), turn[:, :, 2]]))
+        return in_order(np.hstack(self.forward(q)), found)
 
     @property
     def in_loops(self) -> tuple[bool, ...]:
@@ -128,12 +145,12 @@ class OnLegs(RedundantLegs):
         if self.loops.holds is not None:
             return self._joints_posed(platform[:, :3], axis, spin)
         gauge = self.turn_of(axis, spin) @ self.gauge
-        standing = np.zeros((len(axis), len(self.carriers_at))) if self.carried_twice else None
-        return np.asarray(self.joints_with(platform[:, :3] + gauge - self.tool_length * axis, axis, spin, standing)[0])
+        at_rest = self._at_rest(axis)
+        return np.asarray(self.joints_with(platform[:, :3] + gauge - self.tool_length * axis, axis, spin, at_rest)[0])
 
     def _joints_posed(self, place: Floats, axis: Floats, spin: Floats) -> Floats:
         """Joints (N, J) with the reference point of a platform with holds, and its carriers, at `place` (N, 3)."""
-        own, turn, carried = self.standing(place, axis, np.zeros(3), spin)
+        own, turn, carried = self.standing(place, axis, np.zeros(3), spin, self._at_rest(place))
         q = np.empty((len(place), self.joints))
         q[:, self.legs_at], q[:, self.carriers_at] = self.legs.solve(self.loops.ends(own, turn), self.legs.roots), carried
         return np.where(np.isnan(q).any(axis=1, keepdims=True), np.nan, q)
@@ -165,7 +182,7 @@ class OnLegs(RedundantLegs):
 
     def jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
         """See the base class."""
-        return by_parts(self._jets, q0, q1) if self.jets_proved else super().jets(q0, q1)
+        return by_parts(self._jets, q0, q1)
 
     def _jets(self, q0: Floats, q1: Floats) -> tuple[TaylorVector, TaylorVector]:
         middle, step = 0.5 * (q0 + q1), q1 - q0

@@ -16,7 +16,6 @@ from machines.kinematics.legs.attitudes import ROUND_OFF, nearest_directions
 from machines.kinematics.legs.coupled import PosesAsked, across_of, standing
 from machines.kinematics.legs.drives import Drives
 from machines.kinematics.legs.loops import Loops, PlatformPose
-from machines.kinematics.legs.modes import found_modes, in_order
 from machines.kinematics.legs.one_turn import OneTurn
 from machines.kinematics.singular_distance import NAMES
 from machines.kinematics.workspace import Workspace
@@ -118,7 +117,7 @@ class PosesOfLegs(Kinematics):
     def _ends(self, tip: Floats, axis: Floats, spin: Floats, given: Floats | None) -> tuple[Floats, Floats]:
         """(platform joints (N, K, 3), travel of the carriers (N, M)) of a tip, axis and spin; NaN where there are none."""
         if self.loops.holds is not None:
-            place, turn, carried = self.standing(tip, axis, self.gauge - self.tool_length * UP, spin)
+            place, turn, carried = self.standing(tip, axis, self.gauge - self.tool_length * UP, spin, given)
             if not self.axis_asked:
                 place = np.where((angle_between(turn[:, :, 2], unit(axis)) <= FOLLOWS)[:, None], place, np.nan)
             return self.loops.ends(place, turn), carried
@@ -132,12 +131,15 @@ class PosesOfLegs(Kinematics):
         place, carried = self._split(tip + self.tool_length * axis - turn @ self.gauge, given)
         return self.loops.ends(place, turn), carried
 
-    def standing(self, target: Floats, axis: Floats, arm: Floats, spin: Floats) -> tuple[Floats, Floats, Floats]:
+    def standing(self, target: Floats, axis: Floats, arm: Floats, spin: Floats,
+                 given: Floats | None = None) -> tuple[Floats, Floats, Floats]:
         """(C (N, 3), R (N, 3, 3), travel of the carriers (N, M)) that put the point `arm` (3,) of a platform with holds at
-        `target` (N, 3) and its z along `axis` (N, 3); NaN where nothing does, or with another spin (N,) than follows."""
+        `target` (N, 3) and its z along `axis` (N, 3); NaN where nothing does, or with another spin (N,) than follows.
+
+        Redundant carriers as of `_split`: they come with legs on rings, whose turn does not ask where they stand."""
         axis = unit(axis)
         near = self._within(axis)
-        asked = PosesAsked(target, arm, near if self.axis_asked else None, across_of(self.carriers))
+        asked = PosesAsked(target, arm, near if self.axis_asked else None, self._across)
         start = np.tile(self.home[1], (len(axis), 1, 1))
         if self.axis_asked:
             x = tool_x(near, np.zeros(len(axis)))
@@ -149,7 +151,10 @@ class PosesOfLegs(Kinematics):
         if self.axis_asked:
             good &= angle_between(near, axis) <= ROUND_OFF
         place = np.where(good[:, None], place, np.nan)
-        carried = (target - place - turn @ arm) @ np.linalg.pinv(self.carriers) if len(self.carriers) else place[:, :0]
+        if self.carried_twice:
+            place, carried = self._split(place, given)
+        else:
+            carried = (target - place - turn @ arm) @ np.linalg.pinv(self.carriers) if len(self.carriers) else place[:, :0]
         return place, np.where(good[:, None, None], turn, np.nan), carried
 
     @property
@@ -160,7 +165,7 @@ class PosesOfLegs(Kinematics):
     def posed(self, place: Floats, axis: Floats, spin: Floats) -> PlatformPose:
         """(C (N, 3), R (N, 3, 3)) with the reference point, carried, at `place` (N, 3) and z along `axis` (N, 3)."""
         if self.loops.holds is not None:
-            return self.standing(place, axis, np.zeros(3), spin)[:2]
+            return self.standing(place, axis, np.zeros(3), spin, self._at_rest(place))[:2]
         return place * self.loops.basis[:3].any(axis=1), self.turn_of(axis, spin)
 
     def turn_of(self, axis: Floats, spin: Floats) -> Floats:
@@ -200,6 +205,15 @@ class PosesOfLegs(Kinematics):
         return bool(len(self.carriers)) and self.loops.translations.shape[1] == 3
 
     @cached_property
+    def _across(self) -> Floats:
+        """(E, 3): directions in which a platform with holds goes by itself; all with redundant carriers."""
+        return np.eye(3) if self.carried_twice else across_of(self.carriers)
+
+    def _at_rest(self, points: Floats) -> Floats | None:
+        """Redundant carriers at 0 (N, M) of N points; None without any."""
+        return np.zeros((len(points), len(self.carriers))) if self.carried_twice else None
+
+    @cached_property
     def _moves(self) -> Floats:
         """(3, F): translations of the platform, then the carriers."""
         return np.column_stack([self.loops.translations, self.carriers.T])
@@ -218,7 +232,7 @@ class PosesOfLegs(Kinematics):
         if self.loops.holds is not None:
             middle = self.workspace.middle[None]
             level = self._within(UP[None]) if self.axis_asked else None
-            asked = PosesAsked(middle, np.zeros(3), level, across_of(self.carriers))
+            asked = PosesAsked(middle, np.zeros(3), level, self._across)
             place, turn, closed = standing(self.loops, asked, (middle, np.eye(3)[None]), (middle, np.eye(3)[None]))
             q = self.legs.solve(self.loops.ends(place, turn), self.legs.roots)
             return place[0] if closed[0] else place[0] * np.nan, turn[0], q[0]
@@ -289,26 +303,6 @@ class PosesOfLegs(Kinematics):
             places[:, swap] = places[::-1, swap]
         return places
 
-    def assembly_modes(self, q: Floats) -> tuple[Floats, Floats]:
-        """See the base class: both of a platform that does not turn, up to 8 of one turn; of others those that are found
-        (`modes.py`)."""
-        q = as_points(q, self.joints, "q")
-        if (one := self.one_turn) is not None:
-            poses = [(p, one.turn(p[:, 3])) for p in one.modes(q[:, self.legs_at])]
-            return (np.stack([self._tip(p[:, :3], turn, q) for p, turn in poses]),
-                    np.stack([np.where(np.isnan(p[:, :1]), np.nan, turn[:, :, 2]) for p, turn in poses]))
-        if not self.loops.closed_form:
-            return self._found_modes(q)
-        tip = np.stack([self._tip(place, None, q) for place in self._modes(q)])
-        return tip, np.where(np.isnan(tip), np.nan, UP)
-
-    def _found_modes(self, q: Floats) -> tuple[Floats, Floats]:
-        found = []
-        for row in q:
-            place, turn = found_modes(self.loops, row[self.legs_at], self.home[0])
-            found.append(np.hstack([self._tip(place, turn, np.tile(row, (len(place), 1))), turn[:, :, 2]]))
-        return in_order(np.hstack(self.forward(q)), found)
-
     def _near(self, pose: Floats, q: Floats) -> PlatformPose:
         """C and R from which Newton starts: of a platform that turns in every direction with the spin of SPINS whose rods
         come nearest to their lengths, where those of none are far off."""
@@ -327,7 +321,7 @@ class PosesOfLegs(Kinematics):
     def _spun(self, tip: Floats, axis: Floats, spin: Floats) -> PlatformPose:
         """(C, R) of a tip (N, 3) seen from the carriers, an axis (N, 3) that the platform can take, and a spin (N,)."""
         if self.loops.holds is not None:
-            return self.standing(tip, axis, self.gauge - self.tool_length * UP, spin)[:2]
+            return self.standing(tip, axis, self.gauge - self.tool_length * UP, spin, self._at_rest(tip))[:2]
         turn = self.turn_of(axis, spin)
         return tip + self.tool_length * axis - turn @ self.gauge, turn
 

@@ -88,8 +88,14 @@ class Comparison:
     lengths: tuple[LengthMargin, ...] = ()
     """how much tools may differ from their gauge lengths, where that is not taken up by a register alone"""
 
+    def ends(self, rows: Ints) -> tuple[Floats, Floats]:
+        """(tip, axis) (K, 3) at the ends of blocks."""
+        if np.isnan(self.tip[:1]).any():
+            return self.poses.poses(self.executed[1], rows, 1.0)
+        return self.tip[rows], self.axis[rows]
+
     def without_poses(self) -> Comparison:
-        """The same with NaN in the place of tip and axis."""
+        """The same with NaN in the place of tip and axis, which `ends` then works out."""
         unknown = repeated(np.full(3, np.nan), len(self.owner))
         return replace(self, tip=unknown, axis=unknown)
 

@@ -5,11 +5,13 @@ point programming: what a number without a point means is a parameter; it is ref
 then to R; K repeats, P in ms. Subprogram call: M98 P L, M99. Tool center point control: G43.4 H, left by G49. Tilted working
 plane command: G68.2 X Y Z I J K, Euler angles about Z, the new X, the new Z; G53.1 aligns the tool; left by G69. AI contour
 control: G5.1 Q1, whose tolerance is a parameter. Reference position: G28. Inch and metric: G20 and
-G21 stay in force over power off.
+G21 stay in force over power off. G80 is of group 09, as the cycles are that it ends: it may stand next to G00, and the code
+of group 01 holds behind it.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import PurePath
 from typing import ClassVar, Literal
 
@@ -32,9 +34,9 @@ from postproc.readback.text.canonical import (
 )
 from postproc.readback.text.euler_angles import turned
 from postproc.readback.text.flow import Call, Structure
-from postproc.readback.text.modal import CYCLES, GROUPS, Groups, codes, number_of
+from postproc.readback.text.modal import CYCLES, GROUPS, Groups, codes, fill, number_of
 from postproc.readback.text.words import Words, tokenise
-from toolpaths.arrays import Bools, Ints
+from toolpaths.arrays import Bools, Ints, among
 from toolpaths.diagnostics import Diagnostic, error
 
 MILLISECONDS = 1e-3
@@ -110,8 +112,12 @@ class FanucReader(IsoReader):
     def canonical(self, text: ProgramText, line: Ints, file: str) -> tuple[Canonical, list[Diagnostic]]:
         """Canonical words; laws in order."""
         self.held: list[WordMeaning] = []
-        code, found = super().canonical(text, line, file)
+        code, found = super().canonical(replace(text, words=behind_cycles(text.words)), line, file)
         return Canonical(code.words, line, tuple(self.held)), found
+
+    def check(self, words: Words, file: str) -> list[Diagnostic]:
+        """Codes and words, G80 and a code of motion in one block among them."""
+        return super().check(behind_cycles(words), file)
 
     def numbers(self, words: Words, line: Ints, file: str) -> list[Diagnostic]:
         """Lengths without a decimal point, whose meaning is a parameter of the control; whole numbers with one."""
@@ -315,6 +321,18 @@ class FanucReader(IsoReader):
         if len(bad):
             found.append(error("gcode.machine_position", "G53 while G0 is not in force", file=file,
                                lines=line[bad][:6].tolist(), count=len(bad), hint="write G53 G0, in this order"))
+
+
+def behind_cycles(words: Words) -> Words:
+    """Words whose G80 is the line or rapid in force: none next to another code of motion; where an arc or nothing is in
+    force itself."""
+    ends = (words.letter == ord("G")) & (words.value == 80.0)
+    if not ends.any():
+        return words
+    blocks, code = codes(words, "G", (0, 1, 2, 3))
+    before = fill(blocks, code, words.lines, np.nan)[words.line]
+    straight = ends & among(before, (0.0, 1.0))
+    return replace(words, value=np.where(straight, before, words.value)).take(~(ends & np.isin(words.line, blocks)))
 
 
 def block(words: Words, b: int) -> dict[str, float]:

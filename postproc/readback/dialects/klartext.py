@@ -10,6 +10,7 @@ with REP, CALL PGM.
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from pathlib import PurePath
 from typing import ClassVar
 
@@ -48,6 +49,8 @@ _PASSIVE = ("BLK FORM", "TOOL DEF", "* -", "*")
 _WORKS = re.compile(r"(?<![A-Z0-9])M ?\d")
 """an M function, which no statement of the shop hides"""
 _CONTOURS = ("CC", "CP", "CR", "C", "LP", "L")
+_CONTOUR = re.compile(rf"({'|'.join(_CONTOURS)})(?![A-Z])")
+_NUMBERED = re.compile(r"\d+\s+")
 _FAST = ((b"F MAX", b"G0"), (b"FMAX", b"G0"), (b" R0", b" G40"), (b" RL", b" G41"), (b" RR", b" G42"))
 _HINT = "allowed are L, C, CR, CP, LP, CC, TOOL CALL, CYCL DEF, CYCL CALL, PLANE SPATIAL, FUNCTION TCPM, LBL, CALL"
 
@@ -106,17 +109,14 @@ class KlartextReader(Reader):
     def _statement(self, row: str, line: int, new: New, statements: list[DialectStatement],
                    file: str) -> list[Diagnostic]:
         """One block that is no plain L."""
-        body = re.sub(r"^\s*\d+\s+", "", row.strip() + " ").strip() if not row.strip().isdigit() else ""
-        own = self.controller.program.passive if self.controller is not None else ()
-        if not body or body.startswith(_PASSIVE) or (not _WORKS.search(body) and any(
-                re.match(rf"{re.escape(p)}(?![A-Z0-9])", body) for p in own if p[1:2].isalpha())):
-            return []
-        made = _named(body)
-        if made is None:
-            made = _contour(body, line, new)
-        if made is None:
+        body = row.strip()
+        body = "" if body.isdigit() else body[match.end():] if (match := _NUMBERED.match(body)) else body
+        block = _block(body, self.controller.program.passive if self.controller is not None else ())
+        if block is None:
             return [error("gcode.syntax", f"not a block that this reader executes: {body[:60]!r}", file=file, lines=[line],
                           hint=_HINT)]
+        made, words = block
+        new += [(line, letter, value) for letter, value in words]
         if made.name:
             new.append((line, STATEMENT, float(len(statements))))
             statements.append(made)
@@ -208,6 +208,23 @@ def _moved(d: Diagnostic, rows: Ints) -> Diagnostic:
     return replace(d, lines=tuple(int(rows[n - 1]) + 1 for n in d.lines))
 
 
+_Word = tuple[str, float]
+_NOTHING = DialectStatement("", ())
+
+
+@lru_cache(maxsize=10_000)
+def _block(body: str, passive: tuple[str, ...]) -> tuple[DialectStatement, tuple[_Word, ...]] | None:
+    """A block that is no plain L: the statement, its words; None where it is none. Programs say the same again and again.
+
+    `passive`: beginnings of blocks of the shop that do nothing.
+    """
+    if not body or body.startswith(_PASSIVE) or (not _WORKS.search(body) and any(
+            re.match(rf"{re.escape(p)}(?![A-Z0-9])", body) for p in passive if p[1:2].isalpha())):
+        return _NOTHING, ()
+    made = _named(body)
+    return (made, ()) if made is not None else _contour(body)
+
+
 def _named(body: str) -> DialectStatement | None:
     """Blocks that begin with a name; None where it is none of these."""
     keys = {f"Q{n}": float(v) for n, v in _QWORD.findall(body)}
@@ -242,29 +259,29 @@ def _keyed(text: str) -> dict[str, float]:
     return {k.strip(": ="): float(v) for k, v in _KEYED.findall(text.replace("=", " "))}
 
 
-def _contour(body: str, line: int, new: New) -> DialectStatement | None:
-    """CC, C, CR, CP, LP and L blocks, and blocks of M functions alone: their words, and the statement that is left."""
-    name = next((n for n in _CONTOURS if re.match(rf"{n}(?![A-Z])", body)), "")
+def _contour(body: str) -> tuple[DialectStatement, tuple[_Word, ...]] | None:
+    """CC, C, CR, CP, LP and L blocks, and blocks of M functions alone: the statement that is left, and their words."""
+    name = match[1] if (match := _CONTOUR.match(body)) else ""
     at, keys, sense, after = len(name), {}, 0.0, ""
-    made: New = []
+    made: list[_Word] = []
     while at < len(body):
         match = _WORD.match(body, at)
         if match is None:
             return None
         at = match.end()
         if match["fmax"]:
-            made.append((line, "G", 0.0))
+            made.append(("G", 0.0))
         elif match["side"]:
-            made.append((line, "G", _SIDES[match["side"]]))
+            made.append(("G", _SIDES[match["side"]]))
         elif match["sense"]:
             sense = 1.0 if match["sense"].endswith("+") else -1.0
         elif match["letter"] in ("F", "M", "S"):
             if not (match["letter"] == "F" and after in ("M128", "M126")):
-                made.append((line, match["letter"], float(match["number"])))
+                made.append((match["letter"], float(match["number"])))
             after = match["letter"] + match["number"]
         elif name == "L" and match["letter"] != "R":
             letter = match["letter"]
-            made.append((line, letter[1].lower() if len(letter) == 2 else letter, float(match["number"])))
+            made.append((letter[1].lower() if len(letter) == 2 else letter, float(match["number"])))
         elif name and (match["letter"] != "R" or name == "CR"):
             keys[match["letter"]] = float(match["number"])
         else:
@@ -272,6 +289,5 @@ def _contour(body: str, line: int, new: New) -> DialectStatement | None:
     if not name and not made:
         return None
     if name in ("L", "LP"):
-        made.insert(0, (line, "G", 1.0))
-    new += made
-    return DialectStatement("" if name in ("L", "") else name, (sense,), keys)
+        made.insert(0, ("G", 1.0))
+    return DialectStatement("" if name in ("L", "") else name, (sense,), keys), tuple(made)

@@ -37,7 +37,7 @@ _NEEDED = {
         rb"|\bR\d+[ \t]*=|=[ \t]*[-+]*[ \t]*(?!(?:IC|AC|DC|ACP|ACN)[ \t]*\([ \t]*[-+.\d]+[ \t]*\))[A-Z_$(\[]"
         rb"|=[ \t]*[-+]?[\d.]+[ \t]*[-+*/]|\bT[ \t]*=[ \t]*\"|\bPROC\b[^\n]*(?:\(|\bSAVE\b)"
         rb"|\bMCALL[ \t]+(?!CYCLE8)[A-Z_]"),
-    "klartext": re.compile(rb"DECLARE STRING|TRANS DATUM|CYCL DEF[ \t]*(?:[78]|10)\.|FN[ \t]*\d+[ \t]*:"
+    "klartext": re.compile(rb"DECLARE STRING|TRANS DATUM|CYCL DEF[ \t]*(?:[78]|1[01])\.|FN[ \t]*\d+[ \t]*:"
                            rb"|(?m:^)[ \t]*(?:\d+[ \t]+)?Q[LRS]?\d+[ \t]*=|Q[LRS]?\d+(?!\d|[ \t]*=)")}
 _SIGNS_OF: dict[MacroLanguage, tuple[bytes, ...]] = {"fanuc": (b"#", b"[", b"GOTO"), "linuxcnc": (b"#", b"[")}
 _BEGINNINGS: dict[MacroLanguage, tuple[re.Pattern[bytes], ...]] = {

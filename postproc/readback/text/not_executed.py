@@ -3,7 +3,7 @@ frames that the reader has not. Looked for where a row is at fault, so that prog
 
 Names: SINUMERIK 840D Programming Manual Fundamentals (ANG, CHF, CHR, RND, RNDM) and Job Planning (FRAME, $P_UIFR, PROC);
 Fanuc B-63534EN (G51 scaling, G51.1 mirror image, optional angle chamfering, corner rounding); Haas Mill Operator's Manual
-96-8210 (G12, G13, G47, G51, G100, G101, G112, G150); TNC 640 Conversational Programming (cycles 11, 26, APPR, DEP,
+96-8210 (G12, G13, G47, G51, G100, G101, G112, G150); TNC 640 Conversational Programming (cycle 26, APPR, DEP,
 RND, CHF, FK).
 """
 
@@ -33,7 +33,7 @@ _RULES: dict[str, tuple[tuple[str, str, str], ...]] = {
     "fanuc": ((r"G0*61\.\d[ \t]*,", "G61.1 or G61.2 with a word behind a comma", SMOOTHING),
               (r",[ \t]*[CRA]", "a chamfer, a rounded corner or an angle behind a comma", CONTOUR)),
     "klartext": (*((rf"^[ \t]*\d*[ \t]*(?:{words})", name, hint) for words, name, hint in _CONTOUR_RULES),
-                 (r"CYCL DEF (?:11|26)\b", "cycle 11 or 26 (scaling)", POINTS)),
+                 (r"CYCL DEF 26\b", "cycle 26 (axis-specific scaling)", POINTS)),
 }
 _RULES["haas"] = (*_RULES["fanuc"], (r"G0*10[01](?![.\d])", "G100 or G101 (mirror image)", POINTS),
                   (r"G0*1[23](?![.\d])", "G12 or G13 (circular pocket)", CONTOUR),

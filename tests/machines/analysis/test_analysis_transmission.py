@@ -2,6 +2,7 @@
 
 import json
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -112,6 +113,13 @@ def test_the_workspace_of_uranesx_is_proved_free_of_singular_points() -> None:
     step = grid_step_that_proves(kinematics.on_rods, floor=100.0)
     assert step is not None and 1.0 < step <= 100.0
     assert grid_step_that_proves(kinematics.on_rods, floor=1000.0) is None
+
+
+def test_a_rod_shorter_than_the_gap_has_no_constant_of_this_kind(tmp_path: Path) -> None:
+    file = tmp_path / "short.toml"
+    file.write_text('base = "delta-parallel-z-compact"\n[kinematics.legs.X]\nslide = [400, 0, 0]\nrod = 800\n')
+    rods = machines.load(file).kinematics.on_rods
+    assert rods is not None and grid_step_that_proves(rods, floor=0.0) is None
 
 
 def test_the_command_proves_it_and_says_for_which_machines(few: None) -> None:

@@ -12,12 +12,19 @@ import pytest
 import machines
 from machines.kinematics import by_samples
 from machines.kinematics.legs.attitudes import direction_of
+from machines.kinematics.legs.bounds import MovingLoops
 from machines.kinematics.legs.on_legs import OnLegs
+from machines.kinematics.legs.ring_ends import EndsOnRings
 from machines.loader import load_checked
 from tests.source import ROOT
 from toolpaths.arrays import Floats
+from toolpaths.rotations import lengths
 
 HEAD = (ROOT / "machines/data/tripod-head.toml").read_text()
+PENTAPOD = (ROOT / "machines/data/linuxcnc-pentapod.toml").read_text().replace(".X]", ".W]").replace(
+    "[kinematics.workspace]", "[kinematics.carriers.X]\ndirection = [0.8, 0, 0.6]\n\n[kinematics.workspace]").replace(
+    "[control]", "[axes.X]\ntravel = [-400, 400]\nvelocity = 300\nacceleration = 3000\njerk = 50000\nhome = 0\n\n"
+    "[control]").replace('module = "pentakins"\n', "")
 OTHERS = {
     "lengths": (("drive = \"slide\"", "drive = \"length\""), ("radius = 350", "radius = 350\nheight = 680"),
                 ("rod = 700", "rod = 660"), ("travel = [280, 1280]", "travel = [-400, 400]"), ("home = 810.82", "home = 0")),
@@ -26,6 +33,8 @@ OTHERS = {
                ("[\"Z\", \"V\", \"W\"]", "[\"A\", \"B\", \"C\"]"), ("axes.Z]", "axes.A]"), ("axes.V]", "axes.B]"),
                ("axes.W]", "axes.C]"), ("travel = [280, 1280]", "travel = [-120, 120]"), ("home = 810.82", "home = 30"))}
 """the head's platform on other drives: 3-RPS and 3-RRS"""
+CARRIED = "carried pentapod"
+"""on a slide along X next to its own motion, which is redundant"""
 
 
 @cache
@@ -33,8 +42,8 @@ def platform(name: str) -> OnLegs:
     if name == "head":
         found = machines.load("tripod-head").kinematics
     else:
-        text = HEAD
-        for old, new in OTHERS[name]:
+        text = PENTAPOD if name == CARRIED else HEAD
+        for old, new in () if name == CARRIED else OTHERS[name]:
             text = text.replace(old, new)
         with TemporaryDirectory() as folder:
             (Path(folder) / "own.toml").write_text(text)
@@ -50,11 +59,13 @@ def asked(kin: OnLegs, n: int, seed: int = 0) -> tuple[Floats, Floats]:
     return rng.uniform(space.lower, space.upper, (n, 3)) + kin.gauge, direction_of("abc", tilt, heading)
 
 
-@pytest.mark.parametrize("name", ["head", *OTHERS])
+@pytest.mark.parametrize("name", ["head", *OTHERS, CARRIED])
 def test_forward_of_inverse_and_rates(name: str) -> None:
     kin = platform(name)
     tip, axis = asked(kin, 300)
     q = kin.inverse(tip, axis)[0]
+    if kin.carried_twice:
+        q = kin.inverse_with(tip, axis, kin.parameters_at(q) + np.linspace(-9.0, 9.0, len(q))[:, None], q)[0]
     found = kin.forward(q)
     assert np.abs(np.hstack(found) - np.hstack([tip, axis])).max() < 1e-9
     calm = q[:40]
@@ -86,6 +97,47 @@ def test_the_bound_of_the_third_derivative_holds_along_moves(name: str) -> None:
               np.linspace(0.05, 0.95, 8)]
         third = np.max([np.linalg.norm(0.5 * p[3] - p[2] + p[1] - 0.5 * p[0], axis=1) / h**3 for p in at], axis=0)
         assert (third <= jet.third * (1.0 + 1e-3) + 1e-6).all() and (jet.third < 1e4 * np.maximum(third, 1e-3)).all()
+
+
+def test_ends_on_rings_go_round_no_faster_than_their_bounds() -> None:
+    """k of `ring_ends.py` and what its derivatives add to the loops, by differences of the ends seen from the platform."""
+    kin = machines.load("linuxcnc-pentapod").kinematics.with_tool(80.0)
+    assert isinstance(kin, OnLegs)
+    q0 = kin.inverse(*asked(kin, 20, 5))[0]
+    step, h = 0.5 * np.random.default_rng(6).normal(size=q0.shape), 0.02
+
+    def at(t: float) -> tuple[Floats, Floats, Floats, Floats]:
+        """Place, turn, rods, and the rate of their ends seen from the platform, turned with it."""
+        poses = [kin._platform(q0 + (t + k * h) * step) for k in (-1.0, 0.0, 1.0)]
+        before, _, after = ((kin.loops.ends(place, turn) - place[:, None]) @ turn for place, turn in poses)
+        place, turn = poses[1]
+        return (place, turn, kin.loops.ends(place, turn) - kin.legs.feet(q0 + t * step),
+                (after - before) @ np.swapaxes(turn, 1, 2) / (2.0 * h))
+
+    middle = at(0.5)
+    jets = MovingLoops(kin.loops, *middle[:2], q0 + 0.5 * step, step).jets()
+    assert kin.loops.rings is not None
+    away = kin.legs.points - middle[0][:, None]
+    rings = EndsOnRings(kin.loops.rings, away, middle[1][:, :, 2], kin.loops.arms(middle[1]))
+    assert np.abs(rings.moved(jets.first) - middle[3]).max() < 1e-4 * np.abs(middle[3]).max()
+    lever, longest = kin.loops.lever, lengths(away) + 12.0
+    good = jets.third < 1e4
+    most = rings.at_most(jets.first, jets.spin, longest, jets.bend * lever, lever)
+    for t in np.linspace(0.1, 0.9, 5):
+        (_, r0, _, k0), (_, r1, rods, k1), (_, r2, _, k2) = (at(t + x * h) for x in (-1.0, 0.0, 1.0))
+        first, second = (k2 - k0) / (2.0 * h), (k2 - 2.0 * k1 + k0) / h**2
+        w, w1 = _spin((r2 - r0) / (2.0 * h), r1), _spin((r2 - 2.0 * r1 + r0) / h**2, r1)
+        adds = np.cross(2.0 * w1, k1) + np.cross(w, np.cross(w, k1)) + np.cross(w, first) + second
+        for seen, bound, near in ((lengths(k1), most.moved, 0.9), (lengths(np.cross(w, k1) + first), most.bent, 0.3),
+                                  (np.abs((rods * adds).sum(axis=2)) / lengths(rods), most.third, 0.1)):
+            assert (seen <= bound * 1.001 + 1e-6)[good].all() and (seen / bound)[good].max() > near
+
+
+def _spin(rate: Floats, turn: Floats) -> Floats:
+    """(N, 1, 3): the skew part of rate R^T, of R' the turn's w, of R'' its w'."""
+    skew = rate @ np.swapaxes(turn, 1, 2)
+    return 0.5 * np.stack([skew[:, 2, 1] - skew[:, 1, 2], skew[:, 0, 2] - skew[:, 2, 0], skew[:, 1, 0] - skew[:, 0, 1]],
+                          axis=1)[:, None]
 
 
 @pytest.mark.parametrize(("old", "new", "code", "words"), [

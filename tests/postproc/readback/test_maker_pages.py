@@ -39,6 +39,15 @@ def program(dialect: str, body: str) -> str:
     return f"%\n{'O0001' if dialect in (FANUC, HAAS) else ''}\n{head}{body}M30\n%\n".replace("%\n\n", "%\n")
 
 
+@pytest.mark.parametrize("dialect", [FANUC, HAAS])
+@pytest.mark.parametrize(("ends", "code"), [("G80\n", 1), ("G0 G80\n", 0), ("G80 G0\n", 0), ("G80\nG0\n", 0)])
+def test_the_code_of_motion_holds_behind_a_cycle(dialect: str, ends: str, code: int) -> None:
+    """H1, B-63943EN-1: G80 to G89 are of group 09, G0 to G3 of group 01. Safe starts of Haas have both in one block."""
+    drilled = "G0 X0. Y0. Z20.\nG1 Z10. F500.\nG81 X1. Y1. Z-9. R5. F500.\n"
+    motion = good(dialect, program(dialect, f"G00 G17 G80\n{drilled}{ends}X30. Y1.\n"))
+    assert motion.code[-1] == code and words(motion)[-1][:2] == [30.0, 1.0]
+
+
 @pytest.mark.parametrize("dialect", G_CODED)
 @pytest.mark.parametrize(("plane", "arc", "axes", "quarter"), [
     ("G17", "G3 X0. Y10. I-10. J0.", (0, 1), (0.0, 10.0, 0.0)), ("G18", "G3 Z0. X10. K-10. I0.", (2, 0), (10.0, 0.0, 0.0)),

@@ -13,6 +13,7 @@ import pytest
 from postproc.job.job import prepare
 from postproc.report.summary import as_text, tools_of
 from postproc.verification import length_limits
+from postproc.verification import read_back as verification
 from postproc.verification.read_back import read_back
 from tests.postproc.kit import SAMPLES, convert, good, setup_of, toolpath
 from toolpaths import read
@@ -92,6 +93,7 @@ def test_margins_are_those_of_executed_programs(name: str, monkeypatch: pytest.M
     result = made(name)
     keeps = length_limits._Proof.keeps
     monkeypatch.setattr(length_limits, "lifted", lambda *given: None)
+    monkeypatch.setattr(verification, "always_lifted", lambda motion: False)
     monkeypatch.setattr(length_limits._Proof, "keeps", lambda proof, *of: keeps(replace(proof, lost={}), *of))
     found, _ = read_back(result.text, replace(result.job, errors=result.job.errors), "part.cls", margins=True)
     assert found is not None and found.lengths == result.comparison.lengths

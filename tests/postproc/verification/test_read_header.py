@@ -35,16 +35,17 @@ def test_every_line_is_read_back(style: str) -> None:
     assert header.corrected is not None and same_name(header.corrected, "mill.toml")
     assert header.setup is not None and same_name(header.setup.name, "a b.toml")
     assert header == ProgramHeader(True, header.corrected, "89abcdef", False, AxesNamed("per-pass", "60"),
-                        SetupNamed(header.setup.name, "0123abcd"), 0.0005, True, "00ff00ff")
+                        SetupNamed(header.setup.name, "0123abcd"), 0.0005, True, "00ff00ff",
+                        axis_tolerance=0.05)
 
 
 @pytest.mark.parametrize("style", STYLES)
 @pytest.mark.parametrize("mm", [0.01, 0.009, 0.0254, 0.00123456, 0.999999])
 def test_lengths_in_inches_come_back_in_mm(style: str, mm: float) -> None:
-    lines = [*Options(tolerance=mm, smoothing=0.00321).header(INCH)]
+    lines = [*Options(tolerance=mm, smoothing=0.00321, axis_tolerance=0.3).header(INCH)]
     assert lines[0].startswith(f"tolerance {mm / 25.4:.7g} inch, ")
     header = read_header(text([*BEGIN, *lines], style))
-    assert header.tolerance == mm and header.smoothing == 0.00321
+    assert header.tolerance == mm and header.smoothing == 0.00321 and header.axis_tolerance == 0.3
 
 
 @pytest.mark.parametrize("style", STYLES)

@@ -107,6 +107,6 @@ def test_a_closed_spline_the_other_way_round_is_found() -> None:
     made = postproc.convert(read.toolpath, "mill-3axis", "fanuc-30i", SetupFile.model_validate(
         {"tools": {"1": {"gauge_length": 120.0}}}), diagnostics=read.diagnostics)
     assert made.ok and made.job is not None and made.comparison is not None and made.source is not None
-    other = replace(made.source, data=text([*points[-2::-1], points[-1]]).encode())
+    other = replace(made.source, held=text([*points[-2::-1], points[-1]]).encode())
     _, found = second_witness(other, made.setup, made.options, made.job, made.comparison, made.text)
     assert {d.code for d in found} == {"witness.path"}

@@ -13,7 +13,7 @@ from postproc.pipeline.result import PostResult
 from postproc.setup.model import SetupFile
 from postproc.verification.second_witness import second_witness
 from postproc.witness.clfile import commanded
-from postproc.witness.commanded import OWN, registers_of, tools_of
+from postproc.witness.commanded import OWN, loads, registers_of, tools_of
 from toolpaths.cl.build import ToolpathBuilder
 
 BARE = b"PARTNO bare\nFEDRAT/500\nGOTO/-10,5,30\nGOTO/-10,5,0\nGOTO/10,5,0\nGOTO/10,5,30\nFINI\n"
@@ -140,5 +140,5 @@ def test_the_register_that_a_record_names_is_in_force_from_there() -> None:
     text = "UNITS/MM\n" + "".join(SAME_NUMBER.format(name, said) for name, said in (
         ("D10", ",ADJUST,3"), ("D6", ""), ("D6", ",ADJUST,9")))
     c = commanded(text.encode())
-    assert registers_of(c, tools_of(c, NAMED)).tolist() == [3] * 4 + [OWN] * 4 + [9] * 4
-    assert registers_of(c, tools_of(c, {})).tolist() == [3] * 8 + [9] * 4
+    assert registers_of(c, loads(tools_of(c, NAMED)), np.arange(12)).tolist() == [3] * 4 + [OWN] * 4 + [9] * 4
+    assert registers_of(c, loads(tools_of(c, {})), np.arange(12)).tolist() == [3] * 8 + [9] * 4

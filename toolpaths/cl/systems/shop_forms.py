@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import field
 from typing import TYPE_CHECKING, Protocol, get_args, runtime_checkable
 
+from toolpaths.aside import aside
 from toolpaths.choices import DialectName, LengthUnit, ShopName
 from toolpaths.cl.systems.as_statements import UP, AsStatements
 from toolpaths.cl.text.log import DiagnosticLog
@@ -109,7 +110,7 @@ class ShopText:
 
     def source(self, data: bytes, units: LengthUnit | None) -> ClSource:
         """The file as the second reading is given it; `data`: its bytes."""
-        return ClSource(data, units or "", self.like, self.plug_in, self.moving or self.text, self.lines)
+        return ClSource(aside(data), units or "", self.like, self.plug_in, self.moving or self.text, self.lines)
 
     def statements(self) -> AsStatements:
         """The records of a reader as statements and points."""
