@@ -100,7 +100,7 @@ def _pecks(top: Floats, axis: Floats, cycle: Cycle) -> list[HoleLeg]:
     legs: list[HoleLeg] = []
     total = cycle.depth + cycle.clearance
     done, k = cycle.steps[0], 1
-    while done < total - 1e-9:
+    while done < total - ROUNDED:
         at = top + (cycle.clearance - done) * axis
         legs.append((at, Phase.PECK, Kind.FEED))
         if cycle.kind == "DEEP":
@@ -114,6 +114,8 @@ def _pecks(top: Floats, axis: Floats, cycle: Cycle) -> list[HoleLeg]:
 
 
 PECKING = frozenset({"DEEP", "BRKCHP"})
+ROUNDED = 0.005
+"""mm from the bottom at which a peck is the last: a step of less is what rounding has left"""
 PECK_RELIEF = 0.254
 """mm short of the last depth where the next peck begins (LinuxCNC G83, G73: 0.010 inch)"""
 FEED_OUT = frozenset({"BORE", "REAM", "TAP"})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from postproc.readback.comparison.tool_changes import AWAY
 from postproc.readback.comparison.unstated_codes import needs, unstated_between
 from postproc.readback.dialects.base import Reader, as_bytes
 from postproc.readback.execution.execute import Motion
-from postproc.readback.text.canonical import COOLANT, LOADED, REGISTER, SMOOTH, Canonical
+from postproc.readback.text.canonical import COOLANT, INCREMENTAL, LOADED, REGISTER, SMOOTH, Canonical
 from postproc.readback.text.modal import codes
 from toolpaths.arrays import Bools, Floats, Ints
 from toolpaths.diagnostics import Diagnostic
@@ -58,14 +59,15 @@ def _restarts(code: Canonical, motion: Motion, job: Job, reader: Reader, operati
     needed = list(needs(code, reader))
     machine = np.isin(motion.block, codes(code.words, "G", (53,))[0])
     begins = np.flatnonzero(np.diff(operation, prepend=operation[:1]) != 0)
-    for a, b in zip(begins, [*begins[1:], len(operation)], strict=True):
+    for a, b in pairwise([*begins.tolist(), len(operation)]):
         cuts = a + np.flatnonzero(cut[a:b])
         if operation[a] < 0 or not len(cuts):
             continue
         homes = a + np.flatnonzero(machine[a:int(cuts[0])])
         label = int(motion.block[max(int(homes[0]) if len(homes) else int(a), 1) - 1]) + 1
         unstated = unstated_between(needed, label, int(motion.block[b - 1]))
-        lacks = [*(reader.stating[what] for what in unstated), *_unnamed(code, motion, int(cuts[0]), label)]
+        lacks = [*(reader.stating[what] for what in unstated), *_unnamed(code, motion, int(cuts[0]), label),
+                 *_unplaced(code, motion, job, int(cuts[0]), label)]
         if lacks:
             one = job.toolpath.operations[int(operation[a])]
             name = one.name or operation[a] + 1
@@ -88,6 +90,22 @@ def _unnamed(code: Canonical, motion: Motion, row: int, label: int) -> Iterator[
     for what, blocks in stated.items():
         if blocks is not None and not ((blocks >= label) & (blocks <= block)).any():
             yield what
+
+
+def _unplaced(code: Canonical, motion: Motion, job: Job, row: int, label: int) -> Iterator[str]:
+    """Axes that nothing moves to their place between block `label` and a row that cuts, and clamps that nothing opens before
+    they turn: nobody knows where they stand there. A plane may turn rotary axes without words of theirs."""
+    words, block, machine = code.words, int(motion.block[row]), job.machine
+    turned_by_plane = motion.frames[int(motion.frame[row])].law == "tilted" and job.controller.plane_turns
+    for letter, turns in zip(machine.axis_names, machine.rotary, strict=True) if not job.control.tip_law else ():
+        placed = np.concatenate([words.pick(letter)[0], words.pick(chr(ord(letter) + INCREMENTAL))[0]])
+        placed = placed[(placed >= label) & (placed <= block)]
+        if not len(placed) and not (turns and turned_by_plane):
+            yield f"where {letter} stands"
+        if letter in machine.clamp_codes and len(placed):
+            free, _ = codes(words, "M", (float(machine.clamp_codes[letter].unclamp[1:]),))
+            if not ((free >= label) & (free < placed.min())).any():
+                yield f"that the clamp of {letter} is open"
 
 
 def _divided(data: bytes | str, job: Job, faults: Faults) -> Iterator[Diagnostic]:

@@ -266,13 +266,13 @@ class IsoWriter(Writer):
         cycles = self.controller.cycles
         z, r = self.lengths(np.array([hole.bottom, hole.plane_level]))
         out = cycles.to_plane if abs(hole.retract - hole.plane_level) < 1e-9 else cycles.to_initial
-        extra = ""
+        extra, first = "", 0.0
         if spec.peck:
             whole = cycle.depth + cycle.clearance
             first = max(self.peck_of(cycle, hole.plane_level - hole.bottom), cycle.steps[0]) if cycle.steps else whole
             extra += self._word(spec.peck, first)
         if spec.less and spec.least:
-            extra += self._word(spec.less, cycle.steps[0] - min(cycle.steps)) + self._word(spec.least, min(cycle.steps))
+            extra += self._word(spec.less, first - min(cycle.steps)) + self._word(spec.least, min(cycle.steps))
         if spec.dwell and cycle.dwell > 0.0:
             dwell = str(round(cycle.dwell * 1000.0)) if cycles.dwell_milliseconds else self.plain(cycle.dwell)
             extra += f"{self.space}{spec.dwell}{dwell}"

@@ -20,6 +20,7 @@ from postproc.controllers.texts import CYCLE_LENGTHS, blocks_of
 from postproc.job.smoothing import Smoothing
 from postproc.path.model import ARC
 from postproc.reference.coolant import CoolantCommand, switching
+from postproc.reference.holes import ROUNDED
 from postproc.writing.block_text import NumberStyle, WordColumn
 from toolpaths.arrays import Floats, Ints
 from toolpaths.toolpath import Cycle
@@ -235,13 +236,17 @@ class WriterState:
 
     def peck_of(self, cycle: Cycle, depth: float) -> float:
         """Depth of the first peck of a hole of `depth`, mm: the whole of it where the cycle names none. Pecks that divide it
-        but for what rounding has made of it are rounded up: the control would drill a last one of that."""
-        step = min(cycle.steps[0], depth) if cycle.steps else depth
-        grain, count = self.controller.grain, max(round(depth / step), 1)
-        rest = depth - count * grain * round(step / grain)
-        if len(set(cycle.steps)) > 1 or not 0.0 < rest < _REST:
+        but for what rounding has made of it are rounded up, of pecks that fall the first is deeper by it: the control would
+        drill a last one of that."""
+        step, grain = min(cycle.steps[0], depth) if cycle.steps else depth, self.controller.grain
+        next_step = min((*cycle.steps, step))
+        first, least = (grain * round(mm / grain) for mm in (step, next_step))
+        count = max(round((depth - step) / next_step), 0)
+        rest = depth - first - count * least
+        if rest <= 0.0 or depth - step - count * next_step >= ROUNDED:
             return step
-        return math.ceil(depth / count / grain - 1e-6) * grain
+        return first + math.ceil(rest / grain - 1e-6) * grain if next_step < step else math.ceil(
+            depth / (count + 1) / grain - 1e-6) * grain
 
     def hole_feed(self, hole: Hole) -> float:
         """Feed of drilling down in a hole, as F states it; that of a tap keeps the pitch at the speed that is written."""
@@ -352,8 +357,6 @@ class WriterState:
 
 SHARE = 1e6
 """steps in an inch that a share of the tolerance is rounded down to where the control's decimals leave nothing"""
-_REST = 0.005
-"""mm that are no peck of their own"""
 SPEED_DIGITS = 3
 """decimals of a speed from 1 to 10; one less each time that it is ten times as great"""
 _SWITCH = re.compile(r"M\d+")

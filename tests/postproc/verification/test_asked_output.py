@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
+import numpy as np
 import pytest
 
 import machines
@@ -12,7 +13,8 @@ import toolpaths
 from postproc.base.options import Options
 from postproc.pipeline.result import PostResult
 from postproc.verification.read_back import read_back
-from tests.postproc.kit import codes, good, setup_of
+from tests.postproc.control.test_clamps import clamping
+from tests.postproc.kit import codes, good, setup_of, toolpath
 from tests.postproc.writing.test_golden_programs import GOLDEN
 from tests.postproc.writing.test_restart_anywhere import FLAT
 from toolpaths.diagnostics import Diagnostic, Severity
@@ -61,8 +63,8 @@ def test_a_program_that_ignores_a_key_of_its_form_is_found(controller: str, mach
 @pytest.mark.parametrize(("controller", "word", "says"), [
     ("fanuc-30i", "G54", "work offset"), ("fanuc-30i", "G21 ", "units"), ("linuxcnc", "G17 ", "G17"),
     ("fanuc-30i", "G05.1 Q1", "smoothing"), ("haas-ngc", "G187 P3 E0.003", "smoothing"),
-    ("linuxcnc", "G64 P0.002 Q0.001", "smoothing"), ("siemens-840d", "G54", "work offset"),
-    ("heidenhain-tnc640", "Q339", "preset")])
+    ("linuxcnc", "G64 P0.002 Q0.001", "smoothing"),
+    ("siemens-840d", "G54", "work offset"), ("heidenhain-tnc640", "Q339", "preset")])
 def test_each_state_that_an_operation_does_not_restate_is_named(controller: str, word: str, says: str) -> None:
     """The last of its kind, which stands behind the start of the second operation, left out."""
     result = made(controller, "mill-3axis", "[output]\nrestart = true\n")
@@ -74,3 +76,40 @@ def test_each_state_that_an_operation_does_not_restate_is_named(controller: str,
         rows[at] = rows[at].replace(word, "")
     noted = [d for d in found(result, "\n".join(rows) + "\n") if d.code == "verify.asked"]
     assert len(noted) == 1 and says in noted[0].message and "OP1" in noted[0].message
+
+
+@cache
+def turning() -> PostResult:
+    """Two operations that turn A while they cut, the second from where the first has ended; with codes for clamps."""
+    def operation(name: str, start: int, step: int, side: int) -> list[str]:
+        axes = [np.array([np.sin(a), 0.0, np.cos(a)]) if side else np.array([0.0, np.sin(a), np.cos(a)])
+                for a in np.deg2rad([start, start + step, start + 2 * step])]
+        ends = [f"GOTO/{5 * k},0,40," + ",".join(f"{v:.9f}" for v in axis) for k, axis in enumerate(axes)]
+        above = [end.replace(",0,40,", ",0,80,") for end in ends]
+        load = ["LOAD/TOOL,1"] if side else []
+        return [f"TOOL PATH/{name},TOOL,T1", "MSYS/0,0,0,1,0,0,0,1,0", *load, "SPINDL/RPM,1000,CLW", "RAPID", above[0],
+                "FEDRAT/MMPM,600", *ends, "RAPID", above[-1], "END-OF-PATH"]
+
+    path = toolpath(*operation("ONE", 10, 10, 1), *operation("TWO", 30, -10, 0), head=["UNITS/MM"])
+    setup = setup_of(TOOLS + "[output]\nrestart = true\n")
+    return good(postproc.convert(path, clamping(), "fanuc-30i", setup, Options(output="axes")))
+
+
+@pytest.mark.parametrize(("old", "new", "says"), [
+    ("A30. C", "C", "where A stands"), ("M11\n", "", "the clamp of A is open")])
+def test_axes_and_clamps_that_an_operation_leaves_as_they_are_are_named(old: str, new: str, says: str) -> None:
+    """A stands free at 30 degrees behind the first operation, and nobody knows where if it begins with the second."""
+    head, _, second = turning().text.partition("(TWO)")
+    assert old in second
+    noted = [d for d in found(turning(), f"{head}(TWO){second.replace(old, new, 1)}") if d.severity is Severity.ERROR]
+    assert [d.code for d in noted] == ["verify.asked"] and says in noted[0].message and "TWO" in noted[0].message
+
+
+def test_a_block_left_out_of_the_first_operation_is_no_fault_of_ours() -> None:
+    """Where the motion behind it serves no operation that is known, nothing is said of taking it up."""
+    result = made("fanuc-30i", "mill-3axis", "[output]\nrestart = true\n")
+    head, _, text = result.text.partition("T1 M6\n")
+    first = text.partition("(OP1)")[0].splitlines(keepends=True)
+    for block in ("T1 M6\n", *first[1:6]):
+        left = (head + "T1 M6\n" + text).replace(block, "", 1)
+        assert any(d.severity is Severity.ERROR for d in found(result, left)) or block.startswith("G0"), block

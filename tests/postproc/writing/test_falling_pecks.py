@@ -146,3 +146,12 @@ def test_pecks_that_divide_the_hole_are_no_more_in_inches(controller: str, depth
     """Rounded words leave less than a hundredth of a millimetre, which is no peck."""
     result = good(drilled(controller, step, step, 0.0, "inch", depth))
     assert len(pecks(result)) <= round((depth + 3.0) / step + 0.49999)
+
+
+@pytest.mark.parametrize(("controller", "first", "then", "units", "depth", "count"), [
+    ("haas-ngc", 8.0, 3.0, "inch", 32.0, 10), ("heidenhain-tnc640", 7.3, 2.6, "inch", 22.9, 7),
+    ("linuxcnc", 5.0, 3.0, "mm", 14.004, 5), ("siemens-840d", 5.0, 3.0, "mm", 14.004, 5)])
+def test_what_rounding_leaves_is_no_peck(controller: str, first: float, then: float, units: str, depth: float,
+                                         count: int) -> None:
+    """Pecks that divide the depth, their words rounded down, and a file that is 0.004 mm deeper than they are."""
+    assert len(pecks(good(drilled(controller, first, then, 0.0, units, depth)))) == count
