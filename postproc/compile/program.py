@@ -65,9 +65,10 @@ class Section:
         angles: the printed angles in degrees, in the order of the controller's convention
         rotary: words (degrees) where the rotary axes stand on entering, by letter
         place: number of the place whose work offset is in force
-        out: Z of a plane, mm, without a tool length, at which the length goes off where the section ends: just below home,
-            or, where the tool does not go home from there along Z of the plane, where it stands
-        into: Z of machine coordinates, mm, without a tool length, where the tool stands when a plane is entered from them
+        out: Z of a plane, mm, without a tool length, at which the length goes off where the section ends: just below home;
+            NaN where the tool does not go home from there along Z of the plane: a block with Z would move it by what its
+            length differs from the stated one
+        into: the same of the machine coordinates from which a plane is entered
     """
 
     first: int

@@ -45,15 +45,16 @@ def _out(job: Job, moves: Moves, path: JointPath, end: int) -> float:
     """`Section.out` of a section that ends with block `end`."""
     machine, letters = job.control.machine, job.control.machine.axis_names
     axis, z, up = machine.retract_axis, letters.index("Z"), np.stack([path.q[end], path.q[end]])
-    homes = axis >= 0 and end + 1 < len(path) and bool(path.home[end + 1] and path.state[end + 1, axis])
-    if homes:
-        up[1, axis] = machine.home[axis] - BELOW_HOME * np.sign(machine.home[axis] - path.q[end, axis])
+    if axis < 0 or end + 1 >= len(path) or not path.home[end + 1] or not path.state[end + 1, axis]:
+        return float("nan")
+    up[1, axis] = machine.home[axis] - BELOW_HOME * np.sign(machine.home[axis] - path.q[end, axis])
     tool = block_tools(path, moves)
     below, above = unrounded_words(path, up, np.array([end, end]), tool, job.kinematics, job.offset_length)
     travel = np.abs(above - below)
     travel[z] -= abs(up[1, axis] - up[0, axis])
-    rises = homes and above[z] > below[z] and np.abs(travel).max() <= float(job.grid.grain.min())
-    return float((above if rises else below)[z]) + job.offset_length(int(tool[end]))
+    if not above[z] > below[z] or np.abs(travel).max() > float(job.grid.grain.min()):
+        return float("nan")
+    return float(above[z]) + job.offset_length(int(tool[end]))
 
 
 def with_sections(commands: Commands, sections: tuple[Section, ...], line: Ints) -> Commands:

@@ -140,16 +140,18 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     if margins and not has_errors([*comparison.diagnostics]):
         trial = LengthTrial(whole, offsets, job)
         comparison = replace(comparison, lengths=length_margins(trial, motion, executed, comparison))
-    return comparison, [*diagnostics, *_converted_with(noted, header, job)]
+    return comparison, [*diagnostics, *_converted_with(noted, header, job, comparison)]
 
 
-def _converted_with(found: list[Diagnostic], header: ProgramHeader, job: Job) -> list[Diagnostic]:
-    """The same; the first error names the tolerances of the header where these allow more than is asked for here."""
+def _converted_with(found: list[Diagnostic], header: ProgramHeader, job: Job, seen: Comparison) -> list[Diagnostic]:
+    """The same; the first error names the tolerances of the header where these allow more than is asked for here, and what
+    the program is off by too."""
     options, errors = job.options, [k for k, d in enumerate(found) if d.severity is Severity.ERROR]
     stated = (("tolerance", header.tolerance, options.tolerance),
               ("axis-tolerance", header.axis_tolerance, options.axis_tolerance))
     said = [f"--{name} {mine:g}" for name, mine, here in stated if mine > here * (1.0 + 1e-9)]
-    if not (said and errors and header.ours):
+    within = seen.worst_tip <= (header.tolerance or 0.0) and seen.worst_axis <= (header.axis_tolerance or 0.0) * DEG
+    if not (said and errors and header.ours and within):
         return found
     k = errors[0]
     hint = f"verify with {' '.join(said)}, which the program was converted with by its header"

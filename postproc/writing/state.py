@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from functools import cached_property
+from itertools import pairwise
 from textwrap import wrap
 
 import numpy as np
@@ -116,7 +117,9 @@ class WriterState:
         p, rules = self.program, self.controller.tools
         modes = [(section, mode) for section in p.sections if (mode := self.mode_of(section)) is not None]
         taken = any("{register}" in block for _, mode in modes for block in mode.enter)
-        alone = any(mode.length == "off" and math.isnan(section.out) for section, mode in modes)
+        open_in = {section.first for old, section in pairwise(p.sections) if old.law == "axes" and math.isnan(section.into)}
+        alone = any(mode.length == "off" and (math.isnan(section.out) or section.first in open_in)
+                    for section, mode in modes)
         start = not self.goes_home(0) and any(mode.lifted for _, mode in modes)
         changes = [k for k, commands in p.commands.items() if any(c.name == "CHANGE_TOOL" for c in commands)]
         away = not rules.length_with_z or any(k == 0 or not self.goes_home(k - 1) for k in changes)

@@ -131,6 +131,7 @@ _TWO_NUMBERS = pattern(r"[\d.]\s+[-+.\d]")
 _STARTS_NUMBER = frozenset("+-.0123456789")
 _LEADING_ZEROS = pattern(r"[+-]?(?:0\d+|\.0*)")
 _ONLY_ZEROS, _POINT_FIRST = pattern(r"[+-]?\.0+"), re.compile(rb"[/,\s][+-]?\.\d*[1-9]\d*[,\s]")
+_NO_COMMA = "a blank between two numbers"
 _CUT_OFF = "a number is cut off at its point"
 
 
@@ -153,10 +154,13 @@ def check_forms(program: StatementList, log: DiagnosticLog, allowed: Iterable[st
             name = statement.major.removeprefix(DATA_COMMENT)
             between = "/" if statement.body and statement.slash else " " if statement.body else ""
             comma = name == "FEDRAT" and len(statement.numbers) == 2 and all(n == int(n) for n in statement.numbers)
-            log.error("cl.form", f"{name}{between}{statement.body[:60]}: {fault}", line,
-                      "write a point for a decimal comma: 1.5 for 1,5" if comma else "check the record in the CAM "
-                      f"system; if it is right, --allow-unknown {shlex.quote(statement.major)} takes it as it stands",
-                      key=f"{name} {fault}")
+            hint = "check the record in the CAM system; if it is right, --allow-unknown " \
+                   f"{shlex.quote(statement.major)} takes it as it stands"
+            if comma:
+                hint = "write a point for a decimal comma: 1.5 for 1,5"
+            elif fault == _NO_COMMA:
+                hint = "write the comma, or the point, that is missing"
+            log.error("cl.form", f"{name}{between}{statement.body[:60]}: {fault}", line, hint, key=f"{name} {fault}")
 
 
 def fault_of(s: Statement, allow: frozenset[str] = frozenset()) -> str:
@@ -261,7 +265,7 @@ def _split_word(s: Statement, form: RecordForm) -> str:
                 return f"{a} {b}: {whole} is cut in two"
     free = s.major == "CYCLE" and ("," not in s.body.partition(",")[2] or "G98" in s.words or "G99" in s.words)
     if not free and any(_TWO_NUMBERS.search(part) for part in s.body.split(",")):
-        return "a blank between two numbers"
+        return _NO_COMMA
     return ""
 
 
