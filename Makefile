@@ -77,6 +77,7 @@ numeric: $(STAMP)
 
 # The documentation as a site that opens offline, out/docs/index.html, and out/postproc.1 for man. Warnings are errors.
 docs: $(STAMP)
+	@echo "the site: about five minutes" >&2
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
 	$(BIN)/python -m sphinx -q -b man docs out
 

@@ -226,6 +226,12 @@ class Machine:
         """What `moves_along_tool` has found, by joint."""
         return {}
 
+    def drive_count(self) -> int:
+        """Joints that are not rotary axes outside the legs."""
+        legs = self.kinematics.leg_geometry
+        own = 0 if legs is None else len(legs.names) + len(legs.carrier_names)
+        return own or int((~np.array(self.rotary)).sum())
+
     def _places(self) -> Floats:
         """Joints (N, J) all over the travel, a turn of axes that go round, and home."""
         limits = self.limits

@@ -317,7 +317,6 @@ def _head_pivot(joint: Joint) -> Iterator[KeyProblem]:
 
 def _platform(machine: Machine) -> Iterator[KeyProblem]:
     """Of a machine on legs: home lies in the workspace, and travel holds it."""
-    from machines.analysis.limits_of_box import drives
     from machines.reach import reach
 
     over = machine.kinematics.over_workspace
@@ -325,13 +324,14 @@ def _platform(machine: Machine) -> Iterator[KeyProblem]:
         return
     place, tilt = over.workspace.grid(PLACES)
     places = np.vstack([[*over.workspace.middle, np.clip(0.0, *over.workspace.tilt)], np.column_stack([place, tilt])])
-    q = over.joints_at(places, np.zeros((len(places), len(machine.axis_names) - drives(machine))))
+    q = over.joints_at(places, np.zeros((len(places), len(machine.axis_names) - machine.drive_count())))
     margins, names = reach(machine.kinematics, machine.home[None]), machine.axis_names
     faces = [(name, value) for name, value, own in zip(margins.names, margins.values[0], margins.of_box, strict=True)
-             if own and value < 0.0]
+             if own and not value >= 0.0]
     if faces:
         at = ", ".join(f"{name} {_shown(machine, j, q[0, j])}" for j, name in enumerate(names) if np.isfinite(q[0, j]))
-        says = "home is outside the workspace: " + ", ".join(f"{name} by {-value:g}" for name, value in faces)
+        by = ", ".join(f"{name} by {-value:g}" for name, value in faces if np.isfinite(value))
+        says = f"home is outside the workspace: {by}" if by else "at home the legs do not reach the platform"
         yield KeyProblem("machine.plausible", ("axes", names[0], "home"), says, f"the middle of the workspace is at {at}")
     low, high = machine.limits.lower, machine.limits.upper
     beyond = np.nan_to_num(np.maximum(low - q, q - high), nan=0.0)

@@ -19,7 +19,7 @@ from pydantic_core import ErrorDetails
 
 from machines.toml_lines import KEPT, SHORT, KeyPath, Values, dotted, own_copy, parsed, table_named
 from machines.user_model import SCHEMA_KEY, key_texts
-from machines.value_words import POINT, advice, allowed, decimal_comma, meant, nearest, nearest_word
+from machines.value_words import POINT, advice, allowed, as_in_programs, decimal_comma, in_dots, meant, nearest, nearest_word
 from toolpaths.cl.text.kinds_of_file import what_is
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
@@ -198,10 +198,14 @@ def _syntax(fault: tomllib.TOMLDecodeError, file: str, text: str, kind: str) -> 
                      hint=f"name the TOML file of the {kind}")
     what, _, place = str(fault).partition(" (at ")
     line = int(place.split()[1].rstrip(",")) if place.startswith("line ") else text.count("\n") + 1
-    number = decimal_comma(next(iter(text.splitlines()[line - 1:line]), ""))
-    if number:
+    there = next(iter(text.splitlines()[line - 1:line]), "")
+    if number := decimal_comma(there):
         return error("file.syntax", f"{number} is not a number", file=file, lines=[line],
                      hint=f"{POINT}: {number.replace(',', '.')}")
+    if wrong := as_in_programs(there):
+        return error("file.syntax", f"not a number of TOML: {', '.join(one for one, _ in wrong)}", file=file, lines=[line],
+                     hint="write digits before and behind the decimal point, and no zeros in front: "
+                     f"{', '.join(meant for _, meant in wrong)}")
     return error("file.syntax", f"not valid TOML: {what}", file=file, lines=[line], hint=_HOW)
 
 
@@ -320,21 +324,31 @@ def _missing(file: UserFile, model: type[BaseModel], faults: list[_Fault]) -> li
 
 
 def _added(model: type[BaseModel], path: KeyPath) -> str:
-    """What to write for a missing key: a table with all that it must have, or a key at its place."""
-    needed = [name for name in _known_keys(model, path) if all(
-        m.model_fields[name].is_required() for m in _tables(model, path) if name in m.model_fields)]
-    if needed:
-        return f"add a table [{dotted(path)}] with {', '.join(f'{name} = ...' for name in needed)}"
+    """What to write for a missing key: a table, or one of several, with all that it must have, or a key at its place."""
+    kinds, name = _kinds(model, path), ".".join(part for part in path if isinstance(part, str))
+    for form, inside in ((f"[{name}]", kinds), (f"[[{name}]]", _elements(kinds, (list, tuple))),
+                         (f"[{name}.NAME]", _elements(kinds, (dict, Mapping)))):
+        models = [one for kind in inside for one in _models(kind)]
+        keys = sorted({field.alias or key for one in models for key, field in one.model_fields.items()})
+        needed = [f"{key} = {in_dots(_kinds(one, (key,)))}" for key in keys for one in models[:1] if all(
+            field.is_required() for m in models for k, field in m.model_fields.items() if key in (k, field.alias))]
+        if needed or (models and form != f"[{name}]"):
+            return f"add a table {form}" + (f" with {', '.join(needed)}" if needed else "")
     where = f"to {table_named(path[:-1])}" if path[1:] else "at the top"
-    return f"add {path[-1]} = ... {where}"
+    return f"add {path[-1]} = {in_dots(kinds)} {where}"
 
 
-def _tables(model: type[BaseModel], path: KeyPath) -> list[type[BaseModel]]:
-    """The models that the table at the path may have."""
+def _elements(kinds: list[Any], of: tuple[Any, ...]) -> list[Any]:
+    """What lists, or tables by name, hold."""
+    return [inner for kind in kinds if get_origin(kind) in of for inner in _inside(kind, 0)]
+
+
+def _kinds(model: type[BaseModel], path: Sequence[str | int]) -> list[Any]:
+    """Types that the value at the path may have."""
     found: list[Any] = [model]
     for part in path:
         found = [inner for kind in found for inner in _inside(kind, part)]
-    return [one for kind in found for one in _models(kind)]
+    return found
 
 
 def _described(model: type[BaseModel], path: Sequence[str | int]) -> str:
@@ -355,10 +369,7 @@ def _shown(value: object) -> str:
 
 def _known_keys(model: type[BaseModel], path: Sequence[str | int]) -> list[str]:
     """Keys that the tables of `model` at `path` know."""
-    found: list[Any] = [model]
-    for part in path:
-        found = [inner for kind in found for inner in _inside(kind, part)]
-    models = [m for kind in found for m in _models(kind)]
+    models = [m for kind in _kinds(model, path) for m in _models(kind)]
     keys = {field.alias or name for m in models for name, field in m.model_fields.items()}
     return sorted(keys if path else keys | {"base"})
 

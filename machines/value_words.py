@@ -7,7 +7,8 @@ import difflib
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
 
 _ALLOWED = {
     "bool_type": "true or false", "float_type": "a number", "int_type": "a whole number", "string_type": "text in quotes",
@@ -22,12 +23,22 @@ _ALLOWED = {
     "string_pattern_mismatch": "text of the form {pattern}"}
 _NUMBER = re.compile(r"\s*[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?\s*$")
 _COMMA = re.compile(r"(?:^|[=\[,])\s*([-+]?\d+),(\d+)\s*(?:#.*)?$")
+_IN_TABLE = re.compile(r"=\s*([-+]?\d+),(\d+)\s*[,}]")
+_TEXT = re.compile(r""""[^"]*"|'[^']*'|#.*""")
+_AS_IN_PROGRAMS = re.compile(r"(?<![\w.+-])([-+]?)(?:(\d+)\.|(\d*)\.(\d+)|(0\d+))(?![\w.:-])")
 POINT = "write a decimal point"
 
 
 def allowed(kind: str, context: Mapping[str, Any]) -> str:
     """Of a fault of pydantic's `kind`; "" for one that speaks for itself."""
     return _ALLOWED.get(kind, "").format(**context)
+
+
+def in_dots(kinds: Sequence[Any]) -> str:
+    """What stands for a value of one of these types in a hint: "..." in brackets for a list."""
+    wrapped = (Annotated, Union, UnionType)
+    parts = [part for kind in kinds for part in (get_args(kind) if get_origin(kind) in wrapped else [kind])]
+    return "[...]" if any(get_origin(part) in (list, tuple) for part in parts) else "..."
 
 
 class AdvisedError(ValueError):
@@ -53,8 +64,19 @@ def advice(kind: str, value: object) -> str:
 
 def decimal_comma(line: str) -> str:
     """The number with a decimal comma at the end of a line that is no TOML; "" for none."""
-    found = _COMMA.search(line)
+    found = _COMMA.search(line) or _IN_TABLE.search(line)
     return f"{found[1]},{found[2]}" if found else ""
+
+
+def as_in_programs(line: str) -> list[tuple[str, str]]:
+    """Numbers of a line as programs for machines have them and TOML has not (`-381.`, `.5`, `007`), each as it is meant."""
+    found = []
+    for one in _AS_IN_PROGRAMS.finditer(_TEXT.sub("", line)):
+        sign, whole, before, behind, padded = one.groups("")
+        number = f"{(whole or before or padded).lstrip('0') or '0'}" + ("" if padded else f".{behind or '0'}")
+        if sign + number != one[0]:
+            found.append((one[0], sign + number))
+    return found
 
 
 LISTED, NEAR = 40, 5

@@ -168,3 +168,18 @@ def test_nothing_stray_at_the_top() -> None:
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     top = {line.strip('"').split("/")[0] for line in listed.splitlines()}
     assert {name for name in top if not name.startswith(".")} - TOP == set()
+
+
+def test_what_benchmarks_import_of_tests_is_there() -> None:
+    """No run of the tests imports them: one had a module that had been moved."""
+    gone = []
+    for path in sorted((ROOT / "tests" / "benchmarks").glob("*.py")):
+        for node in nodes(path):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("tests."):
+                there = ROOT.joinpath(*(node.module or "").split("."))
+                file = there.with_suffix(".py")
+                text = file.read_text(encoding="utf-8") if file.exists() else ""
+                room = {one.stem for one in there.glob("*")}
+                gone += [f"{path.name}: {node.module}.{alias.name}" for alias in node.names
+                         if alias.name not in text and alias.name not in room]
+    assert not gone

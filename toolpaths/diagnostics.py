@@ -111,3 +111,15 @@ def info(code: str, message: str, *, file: str = "", lines: Sequence[int] = (), 
          hint: str = "") -> Diagnostic:
     """A Diagnostic that only says."""
     return Diagnostic(Severity.INFO, code, message, file, _stated(lines), count, hint)
+
+
+SHOWN = 60
+"""characters of a value that a message shows"""
+
+
+def value_shown(value: object) -> str:
+    """What was given in the place of one value: in full where that is short, of arrays their type and shape alone."""
+    if shape := getattr(value, "shape", ()):
+        return f"an array of {getattr(value, 'dtype', 'values')}, shape {shape}"
+    text = repr(value)
+    return text if len(text) <= SHOWN else f"{text[:SHOWN]}..."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from toolpaths.arrays import Floats
+from toolpaths.arrays import Floats, slices
 
 TWO_PI = 2.0 * np.pi
 """rad"""
@@ -45,7 +45,18 @@ def whole_turns(angle: Floats, turn: float = TWO_PI) -> Floats:
 def lengths(v: Floats) -> Floats:
     """Lengths (...,) of vectors (..., 3): column by column, several times as fast as a sum over the last axis."""
     x, y, z = v[..., 0], v[..., 1], v[..., 2]
-    result: Floats = np.sqrt(x * x + y * y + z * z)
+    result: Floats = x * x
+    result += y * y
+    result += z * z
+    result = np.sqrt(result)
+    return result
+
+
+def steps(points: Floats, first: float = 0.0) -> Floats:
+    """(N,) mm from the point before to each of points (N, 3), `first` for the first; few at a time."""
+    result = np.full(len(points), first)
+    for rows in slices(len(points) - 1):
+        result[rows.start + 1:rows.stop + 1] = lengths(points[1:][rows] - points[:-1][rows])
     return result
 
 
@@ -71,7 +82,11 @@ def cross(a: Floats, b: Floats) -> Floats:
 
 def angle_between(a: Floats, b: Floats) -> Floats:
     """Angle (N,) rad between unit vectors `a` and `b` (N, 3), accurate near 0 and pi (Kahan)."""
-    result: Floats = 2.0 * np.arctan2(lengths(a - b), lengths(a + b))
+    if a.shape != b.shape or a.ndim != 2:
+        return np.asarray(2.0 * np.arctan2(lengths(a - b), lengths(a + b)))
+    result = np.empty(len(a))
+    for rows in slices(len(a)):
+        result[rows] = 2.0 * np.arctan2(lengths(a[rows] - b[rows]), lengths(a[rows] + b[rows]))
     return result
 
 

@@ -13,7 +13,7 @@ from toolpaths.arrays import Array, Floats, Ints, shared
 from toolpaths.aside import Aside
 from toolpaths.choices import CycleKind, GivenDialect, GivenUnit, LengthUnit
 from toolpaths.dataclass import dataclass
-from toolpaths.diagnostics import Diagnostic
+from toolpaths.diagnostics import Diagnostic, value_shown
 from toolpaths.given_arrays import CLOSE, GivenArrays, given_rows, off_circle, passes, unit_rows
 from toolpaths.plug_ins import PlugIn
 from toolpaths.shapes import arrays
@@ -282,8 +282,8 @@ class Toolpath:
                     contact: npt.ArrayLike | None = None, name: str = "", file: str = "arrays") -> Toolpath:
         """The path of arrays that a program has computed: one row per position, in the part frame.
 
-        Diagnostics of later stages name rows as lines, counted from 1. No CL file stands behind such a path: it is
-        compared by the read-back, not by the second witness, and its program is "checked, not proved".
+        Diagnostics of later stages name rows as lines, counted from 1. No CL file stands behind such a path: its program is
+        "proved by read-back", without the second reading that "proved by read-back, second reading" names.
 
         Args:
             tip: (N, 3) mm
@@ -349,7 +349,7 @@ def _records(given: GivenArrays, events: Sequence[Event], tool: Ints, tools: Seq
     if index != sorted(index) or any(not 0 <= k <= given.rows for k in index):
         given.fault(f"events act before rows {index[:6]}", f"give them in order, each with an index of 0 to {given.rows}")
     if spindle is not None and (not isinstance(spindle, (int, float, np.number)) or not np.isfinite(spindle) or not spindle):
-        given.fault(f"spindle is {spindle!r}", "give rev/min, negative for anti-clockwise")
+        given.fault(f"spindle is {value_shown(spindle)}", "give rev/min, negative for anti-clockwise")
         spindle = None
     loaded = {e.index for e in events if e.word == "LOADTL"}
     own = [Event(k, "LOADTL", (float(tools[tool[k]].number),), k + 1)

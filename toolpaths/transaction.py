@@ -28,6 +28,8 @@ READ_ONLY = "it is read-only"
 HELD = "another program holds it open"
 _HELD_BY_OTHERS = (5, 32, 33)
 """numbers of Windows: access denied, sharing violation, lock violation"""
+_PIECE = 1 << 20
+"""characters of a text that are written at a time"""
 _PATIENCE = (0.05, 0.1, 0.2, 0.4)
 """s between tries"""
 
@@ -134,7 +136,9 @@ def _make_folder(folder: Path, made: list[Path]) -> None:
 def _stage(one: _Output, content: str | bytes) -> None:
     """Write one text next to its place, with the mode (and owner, where that is allowed) of the file that it replaces."""
     with os.fdopen(os.open(one.staged, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
-        file.write(content.encode("utf-8") if isinstance(content, str) else content)
+        for at in range(0, len(content), _PIECE):  # a long text is never held in bytes besides
+            piece = content[at:at + _PIECE]
+            file.write(piece.encode("utf-8") if isinstance(piece, str) else piece)
         file.flush()
         if one.old is not None and hasattr(os, "chown"):
             now = os.fstat(file.fileno())

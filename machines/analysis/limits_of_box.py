@@ -55,7 +55,7 @@ def least_margins(machine: Machine) -> dict[str, dict[str, Any]]:
     if over is None:
         return {}
     place, tilt = over.workspace.grid(GRID)
-    turn = np.zeros((len(place), len(machine.axis_names) - drives(machine)))
+    turn = np.zeros((len(place), len(machine.axis_names) - machine.drive_count()))
     q = over.joints_at(np.column_stack([place, tilt]), turn)
     known = np.isfinite(q).all(axis=1)
     if not known.any():
@@ -81,7 +81,8 @@ def extents(machine: Machine) -> dict[str, Any]:
     if over is None or legs is None:
         return {}
     place, tilt = over.workspace.grid(GRID)
-    q = over.joints_at(np.column_stack([place, tilt]), np.zeros((len(place), len(machine.axis_names) - drives(machine))))
+    turn = np.zeros((len(place), len(machine.axis_names) - machine.drive_count()))
+    q = over.joints_at(np.column_stack([place, tilt]), turn)
     feet = kinematics.rig(q[np.isfinite(q).all(axis=1)]).carriages
     if not len(feet):
         return {}
@@ -93,10 +94,3 @@ def extents(machine: Machine) -> dict[str, Any]:
 
 def _sizes(points: Floats) -> dict[str, float]:
     return dict(zip("xyz", np.ptp(points.reshape(-1, 3), axis=0).tolist(), strict=True))
-
-
-def drives(machine: Machine) -> int:
-    """Joints that are not rotary axes outside the legs."""
-    legs = machine.kinematics.leg_geometry
-    own = 0 if legs is None else len(legs.names) + len(legs.carrier_names)
-    return own or int((~np.array(machine.rotary)).sum())

@@ -7,7 +7,7 @@ from itertools import takewhile
 import numpy as np
 
 from postproc.alignment.fit import Alignment
-from postproc.controllers.texts import WORK_OFFSETS
+from postproc.controllers.texts import EMC_OFFSETS, WORK_OFFSETS
 from postproc.job.job import Job
 from toolpaths.arrays import Floats
 from toolpaths.units import DEG
@@ -41,13 +41,13 @@ def control_entry(job: Job, aligned: Job, found: Alignment) -> list[str]:
     values |= {f"d{name}": said.plain(float(v)) for name, v in zip("xyz", shift, strict=True)}
     values |= {name: f"{v + 0.0:.4f}" for name, v in zip("abc", (a, b, c), strict=True)}
     values |= {"offset": job.controller.program.offset_name(job.setup.work_offset_code),
-               "number": str(_number(job.setup.work_offset_code))}
+               "number": str(_number(job.controller.program.offset_name(job.setup.work_offset_code)))}
     return [line.format(**values) for line in rules.entry]
 
 
 def _number(code: str) -> int:
-    """1 for G54, 2 for G55 ..., 5 for G505 of Siemens; else the number that the name of a work offset ends with."""
-    if code in WORK_OFFSETS:
-        return WORK_OFFSETS.index(code) + 1
+    """By the control's name: 1 for G54, ..., 7 for G59.1, 5 for G505 of Siemens; else the number that the name ends with."""
+    if code in (*WORK_OFFSETS, *EMC_OFFSETS):
+        return (*WORK_OFFSETS, *EMC_OFFSETS).index(code) + 1
     number = int("".join(reversed([*takewhile(str.isdigit, reversed(code))])))
     return number - FURTHER if number > FURTHER else number

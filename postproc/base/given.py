@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import SupportsFloat
 
-from toolpaths.diagnostics import Diagnostic, error
+from toolpaths.diagnostics import Diagnostic, error, value_shown
 
 
 def wrong(message: str, remedy: str) -> Diagnostic:
@@ -34,7 +34,7 @@ def faults_of(values: Mapping[str, tuple[object, object]], words: Mapping[str, t
     for name, (value, default) in values.items():
         remedy = _remedy(value, default, words.get(name, ()))
         if remedy:
-            found.append(wrong(f"{name} is {value!r}", remedy))
+            found.append(wrong(f"{name} is {value_shown(value)}", remedy))
     return found
 
 

@@ -111,9 +111,8 @@ class Options:
             lines.append(setup_line(Path(self.setup).name, self.setup_mark))
         if self.hooks:
             lines.append(hooks_line(Path(self.hooks).name))
-        for name in ("units", "dialect"):
-            if getattr(self, name):
-                lines.append(f"{name} {getattr(self, name)}")
+        if read := [f"{name} {getattr(self, name)}" for name in ("units", "dialect") if getattr(self, name)]:
+            lines.append(f"CL file read with {', '.join(f'--{one}' for one in read)}")
         if self.allow_unknown:
             lines.append("allow unknown " + " ".join(self.allow_unknown))
         return lines

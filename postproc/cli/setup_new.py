@@ -78,19 +78,19 @@ def setup_new(file: ClFile, machine: MachineName,
                       allow_unknown=tuple(w.upper() for w in allow_unknown or ()))
     values: dict[str, Any] = {}
     with shown_errors(json), progress_bar() as progress:
-        sheet, options = _made(file, machine, controller, options, given, yes, work_offset_code, progress)
+        sheet, options, asked = _made(file, machine, controller, options, given, yes, work_offset_code, progress)
     text = ""
     outputs: dict[Path, str | bytes] = {}
     if sheet.text and sheet.fit is not None:
         outputs[output] = sheet.text
-        text = _text(sheet, sheet.fit.place, output, file, machine, controller, options)
-    values = _values(sheet, output)
+        text = _text(sheet, sheet.fit.place, output, file, machine, controller, options, asked)
+    values = _values(sheet, output, asked)
     report(sheet.diagnostics, json, values, text, outputs)
 
 
 def _made(file: Path, machine: str, controller: str, options: Options, given: GivenAnswers, yes: bool, code: str,
-          progress: Any) -> tuple[SetupSheet, Options]:
-    """The sheet, and the options with the units that were answered."""
+          progress: Any) -> tuple[SetupSheet, Options, int]:
+    """The sheet, the options with the units that were answered, and how many questions were asked."""
     from dataclasses import replace
 
     from postproc.setup_sheet.make import new_setup
@@ -102,7 +102,7 @@ def _made(file: Path, machine: str, controller: str, options: Options, given: Gi
     try:
         if not yes and _terminal() and not has_errors(found) and any(
                 d.code == "cl.no-units" and d.severity is Severity.WARNING for d in found):
-            options = replace(options, units="inch" if asked(units_question()) == "inch" else "mm")
+            options = replace(options, units="inch" if asked(units_question(path.units)) == "inch" else "mm")
             path, found = read_cl(file, options)
         sheet = new_setup(path, m, controller, options, given, None if yes else asked, yes, found, code, progress)
     except KeyboardInterrupt:
@@ -111,8 +111,7 @@ def _made(file: Path, machine: str, controller: str, options: Options, given: Gi
     except EOFError:
         ended = replace(asked.added(given), complete=True)
         sheet = new_setup(path, m, controller, options, ended, None, False, found, code, progress)
-    own = tuple(question for question, _ in asked.done if question.kind == "units")
-    return replace(sheet, questions=(*own, *sheet.questions)), options
+    return sheet, options, len(asked.done)
 
 
 class _Asking:
@@ -234,9 +233,9 @@ def _numbers(values: list[str], option: str, most: float) -> dict[int, float]:
     return result
 
 
-def _values(sheet: SetupSheet, output: Path) -> dict[str, Any]:
+def _values(sheet: SetupSheet, output: Path, asked: int) -> dict[str, Any]:
     place = sheet.fit.place if sheet.fit is not None else None
-    return {"output": str(output) if sheet.text else None, "questions": len(sheet.questions),
+    return {"output": str(output) if sheet.text else None, "questions": asked,
             "answers": [{"key": key, "value": one.value, "source": one.source} for key, one in sheet.answers],
             "assumed": sheet.assumed if sheet.text else [],
             "tool_numbers": sheet.facts.numbers if sheet.facts is not None else {},
@@ -247,15 +246,14 @@ def _values(sheet: SetupSheet, output: Path) -> dict[str, Any]:
 
 
 def _text(sheet: SetupSheet, place: FoundPlace | None, output: Path, file: Path, machine: str, controller: str,
-          options: Options) -> str:
-    """What was written, and the command that uses it."""
+          options: Options, asked: int) -> str:
+    """What was written after so many questions, and the command that uses it."""
     import shlex
 
-    questions = len(sheet.questions)
     assumed = f", {len(sheet.assumed)} assumed" if sheet.assumed else ""
     target = file.with_suffix(".nc").name if str(file) != "-" else "part.nc"
     words = [str(file), "-m", machine, "-c", controller, "--setup", str(output), *_reading(options), "-o", target]
-    lines = [f"written: {output}, proved by a conversion", f"{questions} question{'s' * (questions != 1)}{assumed}"]
+    lines = [f"written: {output}, proved by a conversion", f"{asked} question{'s' * (asked != 1)} asked{assumed}"]
     if place is not None:
         lines.append(f"part: {place.why}")
     lines.append(f"next: postproc convert {shlex.join(words)}")

@@ -10,7 +10,7 @@ from postproc.clock.allowed import NO_MOTION, SLOWEST, Allowed, allowed
 from postproc.clock.landing import landed, short_move
 from postproc.clock.path import BlendedPath, CommandedPath, blended, sharp
 from postproc.clock.settings import BACKWARD, ControlSettings
-from postproc.clock.speed_kernels import run, slow_down
+from postproc.clock.speed_kernels import can_brake, run, slow_down
 from toolpaths.arrays import Bools, Floats
 from toolpaths.compiled import chosen
 from toolpaths.dataclass import dataclass
@@ -28,7 +28,7 @@ GENTLE = 0.95
 """of the accelerations and jerks has the braking curve, so that the motion can come up to it from below"""
 GENTLER, LAST, AGAIN = (0.94, 0.93, 0.92, 0.9), 30, 160
 """other such shares; cycles before a rest in which a motion that speeds up again has slowed down too early, and from which
-it is tried again"""
+at most it is tried again: from where it can still brake so"""
 NEAR = 2
 """cycles around such a place that become slower"""
 SPIKE, LESS = 2.0, 0.95
@@ -161,9 +161,8 @@ def _moved(part: Allowed, settings: ControlSettings) -> Floats:
     moved = _run(part, settings, np.array([part.s[0], 0.0, 0.0]), GENTLE)
     late = moved[-LAST:]
     if len(late) and (late[:, 2] > 0.0).any() and late[0, 2] < 0.0:
-        begin = max(len(moved) - AGAIN, 0)
         for share in GENTLER:
-            again = np.concatenate([moved[:begin], _run(part, settings, moved[begin], share)])
+            again = _again(part, settings, moved, share)
             moved = again if len(again) < len(moved) else moved
     s = part.s
     ahead = np.minimum.accumulate(part.cap[::-1])[::-1]
@@ -171,12 +170,28 @@ def _moved(part: Allowed, settings: ControlSettings) -> Floats:
     return landed(moved, float(s[-1]), settings.cycle, free)
 
 
+def _again(part: Allowed, settings: ControlSettings, moved: Floats, share: float) -> Floats:
+    """(M, 3) a motion whose end is braked under another share of the limits."""
+    back = AGAIN
+    while back < len(moved):
+        begin = len(moved) - back
+        end = _run(part, settings, moved[begin], share)
+        if len(end):
+            return np.concatenate([moved[:begin], end])
+        back *= 2
+    return _run(part, settings, np.array([part.s[0], 0.0, 0.0]), share)
+
+
 def _run(part: Allowed, settings: ControlSettings, begin: Floats, share: float) -> Floats:
-    """(M, 3) the motion from a state (3,) to rest, its braking curve under that share of the limits."""
+    """(M, 3) the motion from a state (3,) to rest, its braking curve under that share of the limits; none from a state that
+    is too fast for that curve."""
     first = max(int(np.searchsorted(part.s, begin[0], side="right")) - 1, 0)
     part = part.between(first, len(part.s) - 1)
     s, v, a = part.s, np.empty(len(part.s)), np.empty(len(part.s))
     chosen(slow_down, len(s), COMPILE_FROM)(s, part.cap, *_bends(part, settings, share), v, a)
+    if begin[1] > 0.0 and not chosen(can_brake, len(s), COMPILE_FROM)(
+            s, v, 0, *begin.tolist(), settings.cycle, *_bends(part, settings, 1.0)):
+        return np.zeros((0, 3))
     rough = float((np.diff(s) / np.maximum((v[1:] + v[:-1]) / 2.0, SLOWEST)).sum())
     if rough > LONGEST:
         raise ArithmeticError(f"the motion takes {rough:.3g} s")

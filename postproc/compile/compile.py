@@ -47,7 +47,8 @@ def compile_program(job: Job, moves: Moves, path: JointPath,
                                         job.setup.output.tool_call, job.setup.output.stop_between_tools, job.cutcom)
     contour, commands, refused = contour_words(job, moves, path, words, commands)
     cubics = cubic_blocks(job, moves, path, words, feeds, commands, skip if apart is None else skip | apart)
-    end = np.where(path.home[:, None], job.grid.trimmed(path.q * control.unit), cubics.ended(contour.words.end, control.xyz))
+    end, home = np.array(cubics.ended(contour.words.end, control.xyz)), np.flatnonzero(path.home)
+    end[home] = job.grid.trimmed(path.q[home] * control.unit)
     write = without_standing(contour.words.write, end, control.rolls)
     write = cubics.written(write, words, control.xyz, job.grid.grain.min()) if len(cubics.curves) else write
     keep = (write.any(axis=1) | (path.code == ARC)) & ~contour.dropped & ~cubics.dropped

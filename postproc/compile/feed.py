@@ -97,10 +97,11 @@ def feed_words(path: JointPath, control: Control, step: Floats, asked: Floats, n
     have no feed asked for."""
     cutting, arc = path.code != 0, path.code == ARC
     wanted = np.where(cutting, np.nan_to_num(path.seconds), np.nan)
-    turned = np.abs(step)[:, control.rotary].sum(axis=1)
+    turned = np.abs(step[:, control.rotary]).sum(axis=1)
     length, metric = np.zeros(len(path)), np.zeros(len(path))
-    for law, k in path.by_control():
-        length[k], metric[k] = law.feed_units(step[k], unit), law.feed_length(step[k])
+    for law, every in path.by_control():
+        for k in (every[part] for part in slices(len(every))):
+            length[k], metric[k] = law.feed_units(step[k], unit), law.feed_length(step[k])
     metric = np.where(arc & np.isfinite(asked), wanted * asked, metric)
     asked = asked / unit
     length = np.where(arc & np.isfinite(asked), wanted * asked, length)

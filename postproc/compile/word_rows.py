@@ -40,8 +40,9 @@ def word_rows(path: JointPath, moves: Moves, control: Control, kinematics: Calla
     begins = np.flatnonzero(np.diff(path.frame)) + 1
     tool = block_tools(path, moves)
     rounds = grid if made_up else None
-    unrounded = unrounded_words(path, path.q, np.arange(len(path)), tool, kinematics, lengths, rounds)
-    end = grid.rounded(_snapped(grid.rounded(unrounded), path, control, grid.grain, exact))
+    end = unrounded_words(path, path.q, np.arange(len(path)), tool, kinematics, lengths, rounds)
+    end = grid.rounded(end)  # one behind the other: each takes as much room as the path
+    end = grid.rounded(_snapped(end, path, control, grid.grain, exact))
     end = _flat(grid.rounded(_held(end, path, control, tool, grid.places, bidirectional)), path, control)
     start = np.concatenate([end[:1], end[:-1]])
     before = unrounded_words(path, path.q[begins - 1], begins, tool, kinematics, lengths, rounds)
@@ -115,10 +116,16 @@ def _snapped(words: Floats, path: JointPath, control: Control, grain: Floats, ex
     if not len(rotary) or len(words) < 2:
         return words
     snap = SNAP * grain[slides]
-    turning = (words[1:, rotary] != words[:-1, rotary]).any(axis=1) & (path.code[1:] == FEED)
-    turning &= (path.frame[1:] == path.frame[:-1]) & ~(exact & (path.u[1:] == 1.0))
-    step = np.abs(words[1:, slides] - words[:-1, slides])
-    rows = np.flatnonzero(turning & (step <= snap).all(axis=1) & (step > 0.0).any(axis=1)) + 1
+    turning = (path.code[1:] == FEED) & (path.frame[1:] == path.frame[:-1]) & ~(exact & (path.u[1:] == 1.0))
+    found = list[Ints]()
+    for part in slices(len(turning)):
+        before, here = words[:-1][part], words[1:][part]
+        turning[part] &= (here[:, rotary] != before[:, rotary]).any(axis=1)
+        step = np.abs(here[:, slides] - before[:, slides])
+        found.append(part.start + 1 + np.flatnonzero(turning[part] & (step <= snap).all(axis=1) & (step > 0.0).any(axis=1)))
+    rows = np.concatenate(found)
+    if not len(rows):
+        return words
     wanted = words.copy()
     todo = set(rows.tolist())
     for k in rows.tolist():

@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.control.control import Control
 from postproc.controllers.model import ControllerFile
-from toolpaths.arrays import Floats, Ints
+from toolpaths.arrays import Floats, Ints, slices
 from toolpaths.dataclass import dataclass
 from toolpaths.shapes import arrays
 
@@ -33,8 +33,10 @@ class WordGrid:
 
     def rounded(self, words: Floats) -> Floats:
         """Words (K, J), mm and degrees, on the grid."""
-        grain = 10.0 ** -self.places
-        return np.asarray(np.round(np.round(words / self.unit / grain) * grain, self.most) * self.unit)
+        grain, result = 10.0 ** -self.places, np.empty(words.shape)
+        for rows in slices(len(words)):
+            result[rows] = np.round(np.round(words[rows] / self.unit / grain) * grain, self.most) * self.unit
+        return result
 
     def trimmed(self, words: Floats) -> Floats:
         """Words (K, J), mm and degrees, with the most decimals of all: positions of home."""

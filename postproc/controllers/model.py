@@ -9,7 +9,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from machines.choices import Rapids, RolloverRule, Stop
 from machines.user_file import load_toml
@@ -210,6 +210,7 @@ class ControllerFile(UserModel):
     """letters that words of axes may have"""
     sources: tuple[str, ...] = ()
     """documents that the rules come from"""
+    _file: str = PrivateAttr(default="")
     format: Format = Format.unstated()
     units: Units = Units.unstated()
     """the words that state mm or inches"""
@@ -241,6 +242,11 @@ class ControllerFile(UserModel):
     links: LinkRules = LinkRules.unstated()
     pivots: PivotNames = PivotNames.unstated()
     alignment: PartAlignment = PartAlignment.unstated()
+
+    @property
+    def file(self) -> str:
+        """The file that it was loaded from, for diagnostics; "" for none."""
+        return self._file
 
     @property
     def keeps_length(self) -> bool:
@@ -324,7 +330,10 @@ def builtin_files() -> Mapping[str, Path]:
 def load_controller(source: str | Path) -> tuple[ControllerFile | None, list[Diagnostic]]:
     """The controller of a built-in name or a path."""
     if str(source) not in builtin_files():
-        return load_toml(source, ControllerFile, builtin=builtin_files(), kind="controller")
+        own, faults = load_toml(source, ControllerFile, builtin=builtin_files(), kind="controller")
+        if own is not None:
+            own._file = str(source)
+        return own, faults
     spec, found = _of_package(str(source))
     return spec, [*found]
 

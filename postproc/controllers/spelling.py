@@ -10,6 +10,7 @@ from pydantic import Field
 from machines.hooks import PASSIVE, PassiveWord
 from machines.user_model import UserModel
 from postproc.controllers.texts import (
+    EMC_OFFSETS,
     WORK_OFFSETS,
     AlignmentText,
     DwellText,
@@ -121,7 +122,8 @@ class ProgramBlocks(UserModel):
     """safe start: units, modes and planes that the program relies on; {work_offset} is the
     set-up's code, {units} states mm or inches"""
     work_offsets: WorkOffsets = Field(default_factory=dict)
-    """what the controller writes for G54 to G59 and G59.1 to G59.3; empty: those codes themselves"""
+    """what the controller writes for each of G54 to G59, and for further codes that it has ("G110"); empty: for those and
+    G59.1 to G59.3 the codes themselves"""
     more_offsets: dict[Numbered, FurtherOffsets] = Field(default_factory=dict)
     """further work offsets by the name that a set-up states for one, with {number}"""
     operation: tuple[Annotated[str, placeholders("comment", "name", "number")], ...] = ()
@@ -153,9 +155,8 @@ class ProgramBlocks(UserModel):
     """{name} and {number} as in `begin`"""
 
     def offset_block(self, code: str) -> str | None:
-        """The block of a work offset as the set-up names it: one of the nine, or a further one by the
-        control's own name; None where the control has none of that name."""
-        if code in self.work_offsets or (code in WORK_OFFSETS and not self.work_offsets):
+        """The block of a work offset as the set-up names it; None where the control has none of that name."""
+        if code in (self.work_offsets or (*WORK_OFFSETS, *EMC_OFFSETS)):
             return self.work_offsets.get(code, code)
         for name, more in self.more_offsets.items():
             head, tail = name.split("{number}")
@@ -173,8 +174,10 @@ class ProgramBlocks(UserModel):
     @property
     def offsets_named(self) -> str:
         """All names of work offsets that a set-up may state."""
+        own = [code for code in self.work_offsets or EMC_OFFSETS if code not in WORK_OFFSETS]
+        run = len(own) > 1 and len(own) == round(10 ** ("." in own[0]) * (float(own[-1][1:]) - float(own[0][1:]))) + 1
         more = [f"{n.format(number=o.first)} to {n.format(number=o.last)}" for n, o in self.more_offsets.items()]
-        return ", ".join(["G54 to G59", "G59.1 to G59.3", *more])
+        return ", ".join(["G54 to G59", *([f"{own[0]} to {own[-1]}"] if run else own), *more])
 
     def offset_text(self, code: str) -> str:
         """The block that switches a work offset on, as the set-up names it where the control has none such."""

@@ -8,8 +8,10 @@ from typing import Annotated
 
 from pydantic import AfterValidator
 
-WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59", "G59.1", "G59.2", "G59.3")
-"""the codes that a set-up may name"""
+WORK_OFFSETS = ("G54", "G55", "G56", "G57", "G58", "G59")
+"""the codes that a set-up may name on every control"""
+EMC_OFFSETS = ("G59.1", "G59.2", "G59.3")
+"""further ones of controls whose file names none: their own codes"""
 CYCLE_LENGTHS = ("retract", "surface", "clearance", "bottom", "depth", "level", "step", "less", "least", "relief", "pitch",
                  "second")
 """those of `CYCLE_VALUES` that are lengths, in the units of the program"""
@@ -34,8 +36,8 @@ def placeholders(*allowed: str) -> AfterValidator:
 
 def _all_offsets(offsets: dict[str, str]) -> dict[str, str]:
     missing = [code for code in WORK_OFFSETS if code not in offsets]
-    if offsets and (missing or len(offsets) > len(WORK_OFFSETS)):
-        strange = sorted(set(offsets) - set(WORK_OFFSETS))
+    strange = sorted(code for code in offsets if not re.fullmatch(r"G\d+(\.\d)?", code))
+    if offsets and (missing or strange):
         raise ValueError(f"needs one entry for each of {', '.join(WORK_OFFSETS)}; missing: {', '.join(missing) or 'none'}, "
                          f"unknown: {', '.join(strange) or 'none'}")
     return offsets

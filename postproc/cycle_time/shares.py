@@ -76,10 +76,20 @@ def _pauses(blocks: MotionBlocks, times: BlockTimes) -> dict[str, Floats]:
             for cause, name in names.items()}
 
 
+def by_group(e: Estimate, s: TimeShares, group: Ints, count: int) -> dict[str, Floats]:
+    """By cause, s of each of `count` groups of blocks; `group` (E,). Tool changes and the spindle's changes of speed count
+    with the block that follows, which they are for."""
+    sums = {name: summed(values, group, count) for name, values in s.by_cause.items()}
+    p = e.blocks.pauses
+    for name, cause in (("tool_change", Cause.TOOL_CHANGE), ("spindle", Cause.SPINDLE)) if len(group) else ():
+        after = group[np.minimum(p.block + 1, len(group) - 1)]
+        sums[name] = summed(np.where(p.cause == cause, e.timed.pause, 0.0), after, count)
+    return sums
+
+
 def operations(e: Estimate, s: TimeShares) -> list[dict[str, object]]:
     """Time of each operation, by cause."""
-    count = len(e.blocks.operations)
-    sums = {name: summed(values, e.blocks.operation, count) for name, values in s.by_cause.items()}
+    sums = by_group(e, s, e.blocks.operation, len(e.blocks.operations))
     return [{"operation": name, "time_s": float(sum(values[k] for values in sums.values())),
              **{f"{cause}_s": float(values[k]) for cause, values in sums.items()}}
             for k, name in enumerate(e.blocks.operations)]

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path as FilePath
 from types import UnionType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from machines.loader import load as load_machine
 from machines.machine import Machine
-from postproc.base.given import wrong
+from postproc.base.given import faults_of, wrong
 from postproc.base.header_words import read_header
 from postproc.base.options import Options
 from postproc.base.progress import Progress
@@ -62,9 +62,11 @@ def convert(path: Toolpath, machine: Machine | str | FilePath, controller: str |
             file: `PostResult.figures` then say what a summary needs of them
 
     Raises:
-        DiagnosticError: where path or options are none, or machine, controller or set-up cannot be loaded.
+        DiagnosticError: where path, options or keep are none, or machine, controller or set-up cannot be loaded.
     """
     require_call(path, options)
+    if faults := faults_of({"keep": (keep, "all")}, {"keep": get_args(Keep)}):
+        raise DiagnosticError(faults)
     spec, machine, setup, options = _loaded(controller, machine, setup, options or Options())
     found = _reading(path, diagnostics)
     kind: CubicPieces = "uniform" if machine.options.control_points else "pieces"

@@ -7,7 +7,10 @@ from collections.abc import Iterator
 from functools import cache
 
 from machines.hooks import HOOK_VALUES, NAMES, filled
-from postproc.controllers.model import ControllerFile
+from machines.loader import builtin
+from machines.toml_lines import KeyPath
+from machines.user_file import read_toml
+from postproc.controllers.model import ControllerFile, builtin_files
 from postproc.job.job import Job
 from postproc.readback.dialects.base import Reader
 from postproc.readback.dialects.readers import reader_for
@@ -37,7 +40,8 @@ def refused_hooks(job: Job) -> list[Diagnostic]:
         for block in blocks:
             if what := next((w for v in each if (w := _unlike(job.controller, block, v) or _does(reader, filled(block, v)))),
                             None):
-                found.append(error("hooks.code", f"{place} = {block!r}: {what[0]}", file=_file(job, place), hint=what[1]))
+                file, lines = _place(job, place, block)
+                found.append(error("hooks.code", f"{place} = {block!r}: {what[0]}", file=file, lines=lines, hint=what[1]))
     return found
 
 
@@ -138,10 +142,29 @@ def _executed(reader: Reader, job: Job) -> list[Diagnostic]:
         what = known(not shop).by(code)
         if what:
             said = "this control carries it out" if what == code else f"this control carries out {what}"
+            file, lines = (_place(job, "passive", code) if shop else
+                           _in_file(job.controller.file, ("program", "passive"), code))
             found.append(error("hooks.passive", f"{code} is named as passive: {said}, and what follows depends on it",
-                               file=_file(job, "passive") if shop else "", hint=f"take {code} out of passive; modes, moves, "
+                               file=file, lines=lines, hint=f"take {code} out of passive; modes, moves, "
                                "offsets, calls, tools, spindle and coolant are records of the CL file and the set-up"))
     return found
+
+
+def _place(job: Job, key: str, block: str) -> tuple[str, list[int]]:
+    """(file, line) of an entry of a key of [hooks]."""
+    return _in_file(_file(job, key), ("hooks", key), block)
+
+
+def _in_file(file: str, key: KeyPath, entry: str) -> tuple[str, list[int]]:
+    """(file, line) of an entry of a list in a file or in what is its base; the file alone where it cannot be read again."""
+    values = read_toml(file, {**builtin(), **builtin_files()})[0] if file else None
+    if values is None:
+        return file, []
+    held: object = values.values
+    for part in key:
+        held = held.get(part, {}) if isinstance(held, dict) else {}
+    origin = values.origin((*key, held.index(entry)) if isinstance(held, list) and entry in held else key)
+    return origin.file, [origin.line]
 
 
 def _unlike(controller: ControllerFile, block: str, values: dict[str, str]) -> tuple[str, str] | None:

@@ -27,7 +27,7 @@ from postproc.python.conversion import convert
 from postproc.setup.model import SetupFile, alone, load_setup
 from postproc.verification.neighbour_files import NeighbourFiles
 from toolpaths.cl.text.kinds_of_file import looks_like_apt
-from toolpaths.diagnostics import DiagnosticError, error, read_value, require
+from toolpaths.diagnostics import DiagnosticError, error, read_value, require, value_shown
 from toolpaths.toolpath import Toolpath
 
 FileName = str | Path
@@ -136,7 +136,7 @@ def _require_time(source: object, options: object, override: object) -> None:
     """
     require_call(source, options, FileName)
     if not is_number(override, LEAST_OVERRIDE, MOST_OVERRIDE):
-        raise DiagnosticError([wrong(f"override is {override!r}", "give it as a part of the programmed feed, "
+        raise DiagnosticError([wrong(f"override is {value_shown(override)}", "give it as a part of the programmed feed, "
                                      f"{LEAST_OVERRIDE:g} to {MOST_OVERRIDE:g}, 1.0 as programmed")])
 
 

@@ -21,14 +21,15 @@ def convert(path: Toolpath, machine: Machine | str | Path, controller: str | Pat
             setup: SetupFile | str | Path | None = None, options: Options | None = None,
             diagnostics: list[Diagnostic] | None = None, progress: Progress | None = None, *, model: str = "",
             keep: Keep = "all") -> PostResult:
-    """`pipeline.convert.convert`, what is chosen goes by the control's clock.
+    """`pipeline.convert.convert`, whose arguments are the same; what is chosen goes by the control's clock.
 
     Args:
         model: of the control, as of `time`
-        keep: "summary" for long files, as there
+        keep: "all", or "summary" for long files: path, program and feeds are let go once the text is written, and `figures`
+            of the result hold what a summary needs of them; with "all" they are None
 
     Raises:
-        DiagnosticError: as there.
+        DiagnosticError: where path, options or keep are none, or machine, controller or set-up cannot be loaded.
     """
     return run_convert(path, machine, controller, setup, options, diagnostics, progress, program_clock(model), keep)
 
@@ -37,10 +38,11 @@ def verify(gcode: str | Path, path: Toolpath, machine: Machine | str | Path, con
            setup: SetupFile | str | Path | None = None, options: Options | None = None,
            diagnostics: list[Diagnostic] | None = None, progress: Progress | None = None, tool_table: str | Path = "", *,
            model: str = "") -> VerifyResult:
-    """`pipeline.convert.verify`, tool axes chosen by the control's clock as `convert` does; `model` as there.
+    """`pipeline.convert.verify`, tool axes chosen by the control's clock as `convert` does; `model` as of
+    `time`.
 
     Raises:
-        DiagnosticError: as there.
+        DiagnosticError: where path or options are none, or one of the files cannot be loaded.
     """
     return run_verify(gcode, path, machine, controller, setup, options, diagnostics, progress, tool_table,
                       program_clock(model))

@@ -77,7 +77,7 @@ class Moves:
         arcs = Arcs(placement.points(self.arcs.center), placement.directions(self.arcs.normal), self.arcs.radius,
                     self.arcs.sweep)
         return replace(self, tip=placement.points(self.tip), axis=shared(placement.directions(self.axis)), arcs=arcs,
-                       spin=_spin_in(placement, self.axis, self.spin))
+                       spin=shared(_spin_in(placement, self.axis, self.spin)))
 
     def without_pecks(self) -> Moves:
         """The rows but those of pecks: a hole is then one straight path to its bottom."""

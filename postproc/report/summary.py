@@ -252,6 +252,7 @@ def as_text(result: PostResult, output: str, estimate: Estimate | None = None,
     if result.options.smooth:
         lines.append("--smooth: a control that rounds corners itself may take longer where points are moved; --optimise "
                      "moves them only where its time gets less")
+    lines += _other_units(result)
     if result.toolpath.records.total:
         lines.append(f"read: {result.toolpath.records}")
     fallen_back = any(found.code == "output.next_mode" for found in result.diagnostics)
@@ -293,6 +294,13 @@ def as_text(result: PostResult, output: str, estimate: Estimate | None = None,
         lines.append(f"rewinds: {d['rewinds']}")
     lines += unwinding_lines(result)
     return "\n".join(lines)
+
+
+def _other_units(result: PostResult) -> list[str]:
+    """That the program is in other units than its CL file, where it is."""
+    units, read = result.controller.format.units, result.toolpath.units
+    said = f"units: program in {units}, CL file in {read}; [output] units of the set-up states those of the program"
+    return [] if units == read else [said]
 
 
 def verify_dict(result: VerifyResult) -> dict[str, Any]:

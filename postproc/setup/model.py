@@ -222,8 +222,8 @@ class SetupFile(UserModel):
     work_offset: str = ""
     """name of the system of the CL file that is the work offset; default: its first"""
     work_offset_code: str = Field(default="G54", pattern=REGISTER)
-    """register of the control that holds it: G54 to G59, G59.1 to G59.3 where the control has them, or a
-    further one by the control's own name, as "G54.1 P12" (Fanuc), "G154 P40" (Haas), "G520" (Siemens), "preset 12" (TNC)"""
+    """register of the control that holds it: G54 to G59, or a further one by the control's own name, as "G54.1 P12" (Fanuc),
+    "G154 P40" or "G110" (Haas), "G520" (Siemens), "preset 12" (TNC), "G59.1" (LinuxCNC)"""
     part: PartPlacement = PartPlacement.unstated()
     places: list[PlaceSetup] = Field(default_factory=list, max_length=99)
     """[[places]]: the part stands at several places, each with a work offset of its own; [part] and work_offset_code

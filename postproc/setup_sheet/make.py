@@ -27,6 +27,7 @@ from postproc.setup_sheet.questions import (
     three_numbers,
 )
 from postproc.setup_sheet.text import ORIGIN, TOOL_NUMBERS, SheetHeader, sheet_text, sheet_values
+from toolpaths.choices import LengthUnit
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, Severity, error, has_errors, info, read_value, warning
 from toolpaths.toolpath import Toolpath
@@ -159,7 +160,7 @@ def _made(toolpath: Toolpath, machine: Machine, controller: str | Path, options:
     if not fit.result.ok:
         return _with(made, _not_fitted(fit), text="")
     header = SheetHeader(Path(toolpath.file).name, machine.name, fit.result.controller_name, toolpath.units,
-                     _units(found, options), options.tolerance, options.axis_tolerance)
+                     _units(toolpath.units, found, options), options.tolerance, options.axis_tolerance)
     return _with(made, _assumed(made, fit), text=sheet_text(header, facts, answers, fit, toolpath))
 
 
@@ -192,8 +193,8 @@ def _no_such_name(given: GivenAnswers, names: list[str], toolpath: Toolpath) -> 
                   hint=said) for name in wrong]
 
 
-def _units(found: list[Diagnostic], options: Options) -> str:
-    """Where the units come from."""
+def _units(read: LengthUnit, found: list[Diagnostic], options: Options) -> str:
+    """Where the units that the file was read in come from."""
     if options.units:
         return f"answered (--units {options.units}: state it to convert too)"
     said = next((d.severity for d in found if d.code == "cl.no-units"), None)
@@ -201,7 +202,8 @@ def _units(found: list[Diagnostic], options: Options) -> str:
         return "stated by the CL file"
     if said is Severity.INFO:
         return "by the unit of the feeds in the CL file, which has no UNITS record"
-    return "ASSUMED: the CL file states none; where it is in inches, write this file again with --units inch"
+    why, other = ("its feeds are in inches", "mm") if read == "inch" else ("the CL file states none", "inch")
+    return f"ASSUMED: {why}; where its lengths are in {other}, write this file again with --units {other}"
 
 
 def _with(made: SetupSheet, more: list[Diagnostic], text: str) -> SetupSheet:

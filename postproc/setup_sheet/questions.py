@@ -141,9 +141,9 @@ def origin_question(found: tuple[float, float, float]) -> Question:
                     ", ".join(f"{v:g}" for v in found), None)
 
 
-def units_question() -> Question:
-    """The unit of the lengths of a CL file that states none: it is read again by the answer."""
-    return Question("units", 0, f"unit of the CL file, which states none ({', '.join(_WORDS['units'])})", "mm", None)
+def units_question(read: LengthUnit) -> Question:
+    """The unit of the lengths of a CL file that states none, offered as it was `read`: by the answer it is read again."""
+    return Question("units", 0, f"unit of the CL file, which states none ({', '.join(_WORDS['units'])})", read, None)
 
 
 def questions_of(facts: SheetFacts) -> list[Question]:

@@ -13,7 +13,7 @@ from postproc.cycle_time.estimate import Estimate
 from postproc.cycle_time.phases import summed
 from postproc.cycle_time.report import clock
 from postproc.cycle_time.shape import shape, tip_travel
-from postproc.cycle_time.shares import CAUSES, TimeShares, losses, operations
+from postproc.cycle_time.shares import CAUSES, TimeShares, by_group, losses, operations
 from toolpaths.arrays import Floats
 from toolpaths.dataclass import dataclass
 from toolpaths.table_text import table_text
@@ -42,7 +42,7 @@ def by_tool(e: Estimate, s: TimeShares) -> list[TableRow]:
 
     Cuts by the tip's path on the part, rapids by that of the axes.
 
-    A tool change counts with the tool that it loads."""
+    A tool change counts with the tool that it loads, and so does the start of its spindle."""
     blocks = e.blocks
     tool = blocks.tool if blocks.tool is not None else np.full(len(blocks), -1)
     number, first, index = np.unique(tool, return_index=True, return_inverse=True)
@@ -53,14 +53,12 @@ def by_tool(e: Estimate, s: TimeShares) -> list[TableRow]:
     p, change = blocks.pauses, blocks.pauses.cause == Cause.TOOL_CHANGE
     after = index[np.minimum(p.block[change] + 1, len(blocks) - 1)]
     changes = np.bincount(after, minlength=len(number))
-    every = sum((values for name, values in s.by_cause.items() if name != "tool_change"), np.zeros(len(blocks)))
 
     def sums(values: Floats) -> Floats:
         return summed(values, index, len(number))
 
-    changing = summed(e.timed.pause[change], after, len(number))
     columns = {
-        "time_s": sums(every) + changing,
+        "time_s": sum(by_group(e, s, index, len(number)).values(), np.zeros(len(number))),
         "in_cut_s": sums(np.where(cutting, e.timed.seconds, 0.0)),
         "rapids_s": sums(s.by_cause["rapids"]),
         "cut_mm": sums(np.where(cutting, cut, 0.0)),

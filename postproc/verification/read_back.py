@@ -109,8 +109,7 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
     motion, found = run(code, machine.axis_names, offsets, gcode)
     faults = Faults(job.toolpath.file, gcode)
     unseen, alone = check_start(code, job, faults), check_length_alone(data, code, job, gcode)
-    whole = _asked_later(code, motion, job, offsets)
-    code = whole.without(_axis_words(machine))
+    code = (whole := _asked_later(code, motion, job, offsets)).without(_axis_words(machine))
     diagnostics += [_located(d, job.toolpath.file, of_cl) for d in found]
     if has_errors(diagnostics):
         return None, diagnostics
@@ -138,11 +137,10 @@ def read_back(data: bytes | str, job: Job, file: str, progress: Progress | None 
         noted = [*(_of_model(header, job.errors, gcode, has_errors(noted)) if header.corrected is not None else
                    _uncorrected(header, job, motion, executed, comparison, gcode) if has_errors(noted) else []), *noted,
                  *_unmeasured(motion, executed, job, faults)]
-    noted = _converted_with(noted, header, job)
     if margins and not has_errors([*comparison.diagnostics]):
         trial = LengthTrial(whole, offsets, job)
         comparison = replace(comparison, lengths=length_margins(trial, motion, executed, comparison))
-    return comparison, [*diagnostics, *noted]
+    return comparison, [*diagnostics, *_converted_with(noted, header, job)]
 
 
 def _converted_with(found: list[Diagnostic], header: ProgramHeader, job: Job) -> list[Diagnostic]:

@@ -357,7 +357,7 @@ def _cycle(e: Execution, r: Record, line: int) -> None:
     else:
         found = cycles.cycle(r, e.dialect, e.scale, e.feed.now, line)
         if math.isnan(found.depth):
-            e.lost("CYCLE by place", line)
+            e.lost("CYCLE in this form", line)
         e.cycles.append(found)
         e.armed = len(e.cycles) - 1
         e.cycle.set(e.row, e.armed)

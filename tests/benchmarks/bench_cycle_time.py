@@ -22,7 +22,7 @@ from postproc.cycle_time.report import as_dict
 from tests.linuxcnc import simulator, test_cycle_time
 from tests.linuxcnc.time_programs import END, PROGRAMS
 from tests.linuxcnc.time_programs import machine as untimed
-from tests.postproc.cycle_time import test_cycle_time_calibrate as calibration
+from tests.postproc.time_fit import test_cycle_time_calibrate as calibration
 from tests.postproc.time_kit import HEAD, blocks, machine, model
 
 COUNT = 1_000_000

@@ -64,13 +64,23 @@ def test_a_comma_that_became_a_digit_is_seen(text: str) -> None:
 @pytest.mark.parametrize(("unit", "others"), [("MMPM", "MPM MMPS"), ("IPM", "FPM IPS")])
 def test_a_feed_in_a_unit_one_letter_apart_from_the_others_is_seen(unit: str, others: str) -> None:
     """A thousand times as fast, or sixty. Feeds per revolution stand next to those per minute: taps."""
-    text = "UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nFEDRAT/{},100\nGOTO/1,2,3\nFEDRAT/{},200\nGOTO/4,5,6\nFINI\n"
+    text = "UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nFEDRAT/{},10\nGOTO/1,2,3\nFEDRAT/{},20\nGOTO/4,5,6\nFINI\n"
     for other in others.split():
         for both in ((unit, other), (other, unit)):
             [found] = [d for d in read(text.format(*both).encode()).diagnostics if d.severity is Severity.ERROR]
             assert found.code == "cl.feed" and found.lines == (6,) and "line 4" in found.message
     for both in ((other, other), (unit, unit), (unit, f"{unit[:-1]}R")):
         assert not has_errors(read(text.format(*both).encode()).diagnostics)
+
+
+@pytest.mark.parametrize("record", ["FEDRAT/{},250", "FEDRAT/250.0,{}", "CYCLE/DRILL,DEPTH,5,{},250,CLEAR,3"])
+def test_a_feed_that_lost_a_letter_is_seen_in_a_file_with_no_other(record: str) -> None:
+    """250 mm/min as 250 m/min; 60 m/min is what is cut with at most."""
+    text = "UNITS/MM\nLOADTL/1\nSPINDL/RPM,1000,CLW\nGOTO/1,2,3\n" + record + "\nGOTO/4,5,6\nFINI\n"
+    [found] = [d for d in read(text.format("MPM").encode()).diagnostics if d.severity is Severity.ERROR]
+    assert found.code == "cl.feed" and found.lines == (5,) and "250000 mm/min" in found.message
+    for good in (text.format("MMPM"), text.format("MPM").replace("250", "25")):
+        assert "cl.feed" not in {d.code for d in read(good.encode()).diagnostics}
 
 
 @pytest.mark.skipif("DAMAGE" not in os.environ,

@@ -22,6 +22,8 @@ def _batch(code: str, jobs: str, says: str, *does: Edit, words: str = "", **file
 
 
 BATCH = [
+    _batch("file.missing-key", JOBS.partition("[[jobs]]")[0], r"add a table (\[\[jobs\]\]) with (files = \[)\.\.\.\]",
+           Edit("jobs.toml", "", '\n\\1\ncommand = "inspect"\n\\2"part.apt"]\n')),
     _batch("batch.option", JOBS.replace("tolerance", "tolerans"), "did you mean '(tolerance)'",
            Edit("jobs.toml", "tolerans", r"\1")),
     _batch("batch.no_file", JOBS.replace("part.apt", "prat.apt"), r"(\*) stands for any part",

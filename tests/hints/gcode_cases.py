@@ -109,6 +109,7 @@ _ISO = [
     ),
     of("gcode.machine_position", FANUC, "", "G1 G53 Z0.\n", r"\1 Z0.\n", "write (G53 G0)|write (G0 G53)"),
     of("gcode.second_reference", FANUC, "", "G91 G30 Z0.\nG90\n", r"G91 \1 Z0.\nG90\n", "write (G28)", stops=()),
+    of("gcode.iso_units", SIEMENS, "", "G21\n", r"\1\n", "write (G71)", stops=()),
     of("gcode.tool_name", SIEMENS, "", 'T="EM10"\n', "T1\n", "the number of the tool", stops=()),
     of("gcode.subprogram", FANUC, "M30\n", "M99\n", r"\1\n", "write (M30)"),
     of("gcode.subprogram", FANUC, "", "M98 P77\n", "", "known are"),

@@ -144,7 +144,7 @@ _MACHINES = [
     HintCase("feed.slow", f"convert part.apt {ON} -o p.nc",
              {"part.apt": START + CUT.replace("GOTO/0,0,0\n", "FEDRAT/0.6,MMPM\nGOTO/0,0,0\n") + "FINI\n", "s.toml": LENGTH},
              "write (FEDRAT/600,MMPM)", (Edit("part.apt", "FEDRAT/0.6,MMPM", r"\1"),)),
-    HintCase("orient.pass", "orient part.apt -m mikron-ucp710 --setup s.toml --figure p.svg --pass 9",
+    HintCase("orient.pass", "orient part.apt -m mikron-ucp710 --setup s.toml --max-tilt 5 --figure p.svg --pass 9",
              {"part.apt": BALL + "FINI\n", "s.toml": LENGTH}, "passes are numbered (0) to 0",
              (Edit(COMMAND, "--pass 9", r"--pass \1"),)),
     HintCase("verify.option", "verify p.nc part.apt -m m.toml -c fanuc-30i --setup s.toml",

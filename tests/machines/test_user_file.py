@@ -260,7 +260,16 @@ def test_a_decimal_comma_is_reported_with_its_line(text, number, tmp_path):
     d = only(tmp_path, GOOD.replace("velocity = 500", text))
     assert (d.code, d.lines, d.message) == ("file.syntax", (5,), f"{number} is not a number")
     assert d.hint == f"write a decimal point: {number.replace(',', '.')}"
-    assert "no number" not in only(tmp_path, GOOD + "velocity 3\n").message
+    assert "number" not in only(tmp_path, GOOD + "velocity 3\n").message
+
+
+@pytest.mark.parametrize(("value", "said"), [
+    ("[-381.,0,0]", "-381.0"), (".5", "0.5"), ("-.5", "-0.5"), ("[1.0, +.5, 007, 2. ]", "+0.5, 7, 2.0"),
+    ("05.25 # 3.", "5.25"), ("{ a = 1,5, b = 2 }", "1.5"), ('"1." .5', "0.5"), ("[\n0,\n10. ,\n0]", "10.0")])
+def test_a_number_as_programs_have_it_is_said_as_toml_has_it(value, said, tmp_path):
+    """`origin = [-381.,0,0]` was "Unclosed array"."""
+    d = only(tmp_path, f"x = 1.0\nreach = {value}\n")
+    assert d.code == "file.syntax" and d.hint.endswith(f" {said}") and d.lines == ((4,) if "\n" in value else (2,))
 
 
 def test_a_table_and_its_key_on_one_line_are_parted_as_the_hint_says(tmp_path):

@@ -35,7 +35,7 @@ def run(place: Path) -> object:
 
 @pytest.mark.parametrize("place", NOTEBOOKS, ids=[place.stem for place in NOTEBOOKS])
 def test_a_notebook_runs(place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(FOLDER.parent)
+    monkeypatch.chdir(FOLDER)  # as Jupyter does
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     assert run(place) is not None
 

@@ -105,7 +105,8 @@ ProofOption = Annotated[bool, typer.Option("--proof",
 ProofOf = Annotated[str, typer.Option("--proof", metavar="FILE", help="report what has changed since this proof was "
                                       "written; default: GCODE.proof.json, where it is there")]
 Allow = Annotated[list[str] | None, typer.Option("--allow-unknown", metavar="WORD",
-                                                 help="leave records with this word out instead of refusing them; may be "
+                                                 help="leave records with this word out where nothing carries them out, "
+                                                 "take them as they stand where only their form is refused; may be "
                                                  "repeated")]
 
 

@@ -11,10 +11,13 @@ from postproc.reference.moves import Moves
 from toolpaths.arrays import Array, Bools, Floats, Ints, as_slice
 from toolpaths.compiled import chosen, loop
 from toolpaths.dataclass import dataclass
+from toolpaths.rotations import angle_between, lengths
 from toolpaths.shape import Curves
 from toolpaths.shapes import arrays
 
 _COMPILE_FROM = 20_000
+MOST_LOST, MOVES_AHEAD, BLOCKS_AHEAD = 20, 8, 2000
+"""points that no block ends at before the rest is left; how far ahead points and blocks are looked for"""
 _ROWS, _NUMBERS, _KINDS, _NUMBER = ("float64", 2), ("float64", 1), ("int8", 1), ("float64", 0)
 
 
@@ -29,15 +32,63 @@ class EndPoses:
     rewound: Bools
 
 
+@dataclass(frozen=True)
+class Lost:
+    """A point of the CL file that no block ends at, and the block that stands for it; -1 where none does, as where one is
+    left out."""
+
+    move: int
+    block: int
+
+
 def aligned(ends: EndPoses, moves: Moves, link: Bools, tolerance: float, axis_tolerance: float,
-            grain: tuple[float, float]) -> tuple[Ints, Ints]:
-    """`align` without the blocks of rewinds, which get no move (M + 1): but for them the tool only rests there."""
+            grain: tuple[float, float]) -> tuple[Ints, Ints, Lost | None]:
+    """`align` without the blocks of rewinds, which get no move (M + 1): but for them the tool only rests there; and the
+    first point that is lost.
+
+    Behind a point that no block ends at the walk is taken up where the points after it are found again, so that what is
+    said of the rest is not the doing of one wrong block.
+    """
     kept, count = as_slice(np.flatnonzero(~ends.rewound)), len(ends.tip)
-    match, short = align(ends.tip[kept], ends.axis[kept], ends.sweep[kept], moves.curves(), link, tolerance,
-                         axis_tolerance, grain)
+    tip, axis, sweep, curves = ends.tip[kept], ends.axis[kept], ends.sweep[kept], moves.curves()
+    match, short = align(tip, axis, sweep, curves, link, tolerance, axis_tolerance, grain)
+    first, number = None, np.arange(count)[kept]
+    for _ in range(MOST_LOST):
+        if (lost := unreached(match)) < 0:
+            break
+        start = int(match[lost - 1]) + 1 if lost else 0
+        found = _found_again(tip, axis, moves, lost, start, (2.0 * tolerance, 2.0 * axis_tolerance))
+        if found is None:
+            break
+        nearest, stop = found
+        first = first or Lost(lost, int(number[nearest]) if nearest >= 0 else -1)
+        behind = slice(lost + 1, None)
+        match[lost], short[start:stop] = max(stop - 1, 0), lost
+        again, owns = align(tip[stop:], axis[stop:], sweep[stop:], curves.take(behind), link[behind], tolerance,
+                            axis_tolerance, grain)
+        match[behind], short[stop:] = np.where(again >= 0, again + stop, again), owns + lost + 1
+    lost = unreached(match)
     owner = np.full(count, len(moves) + 1)
     owner[kept] = short
-    return np.where(match >= 0, np.arange(count)[kept][match], match), owner
+    return np.where(match >= 0, number[match], match), owner, first or (Lost(lost, -1) if lost >= 0 else None)
+
+
+def _found_again(tip: Floats, axis: Floats, moves: Moves, lost: int, start: int,
+                 near: tuple[float, float]) -> tuple[int, int] | None:
+    """(the block from `start` on that stands for a lost point, -1 for none; the first block behind it); None where none of
+    the points after it is found soon."""
+    rows = slice(start, start + BLOCKS_AHEAD)
+
+    def apart(move: int) -> tuple[Floats, Floats]:
+        turn = angle_between(axis[rows], np.broadcast_to(moves.axis[move], axis[rows].shape))
+        return lengths(tip[rows] - moves.tip[move]) / near[0], turn / near[1]
+    for after in range(lost + 1, min(lost + 1 + MOVES_AHEAD, len(moves))):
+        there = np.flatnonzero(np.maximum(*apart(after)) <= 1.0)
+        if len(there):
+            before = sum(apart(lost))[:there[0]]
+            block = int(before.argmin()) if len(before) else -1
+            return (start + block if block >= 0 else -1), start + block + 1
+    return None
 
 
 def align(tip: Floats, axis: Floats, sweep: Floats, curves: Curves, link: Bools, tolerance: float,
@@ -159,6 +210,9 @@ def _walk(tip: Any, axis: Any, swept: Any, start: Any, end: Any, axis0: Any, axi
             for r in range(j + 1, count):
                 owner[r] = i
             return match, owner
+        # A block that went past the end from one that was nearer to it is not of this move: that one came short.
+        if kind[i] == 0 and k - 2 > j and _apart(tip[k - 1], end[i]) > max(2.0 * tol, _apart(tip[k - 2], end[i])):
+            k -= 1
         # Several blocks may end within the tolerance of the end: the move keeps those up to the last that comes nearer.
         # An arc of more than half a turn is a cut of its own: its tips do not show how far it went from the end.
         j = k - 1

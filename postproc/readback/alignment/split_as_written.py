@@ -28,7 +28,7 @@ def split_as_written(motion: Motion, executed: BlockPoses, job: Job, ends: EndPo
         return job.commanded
     loose = np.array(moves.link)
     loose[rows] = True
-    _, owner = aligned(ends, moves, loose, job.options.tolerance, job.axis_tolerance, grain)
+    _, owner, _ = aligned(ends, moves, loose, job.options.tolerance, job.axis_tolerance, grain)
     place = np.full(len(moves) + 2, -1)
     place[rows] = np.arange(len(rows))
     blocks = np.flatnonzero((place[owner] >= 0) & (np.arange(len(owner)) > 0))

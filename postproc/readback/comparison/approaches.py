@@ -19,6 +19,8 @@ from toolpaths.diagnostics import Diagnostic
 from toolpaths.rotations import angle_between
 from toolpaths.toolpath import Kind
 
+LOWEST = 1.0
+"""mm above the part: room that a set-up is offered to state; what goes lower rises first"""
 _RISES = 1e-6
 """mm along the tool axis that come of reckoning, not of motion"""
 _TURNED = 1e-6
@@ -80,10 +82,11 @@ def check_safe_planes(motion: Motion, executed: BlockPoses, job: Job, home: Floa
         return []
     least_room, line = float(room[low].min()), int(motion.line[rows[low[0]]])
     key, share = ("margin", MARGINS[-1]) if asked.distance is None else ("distance", 1.0)
-    fits = max(math.floor(10.0 * least_room / share), 1.0) / 10.0
-    return [faults.warning("verify.safe_plane", f"a linking move goes aside {least_room:.3f} mm above the part, the safe "
-                           f"plane is {least:g} mm above it", 0, line, len(low), "let it rise there first, or write "
-                           f"{key} = {fits:g} under [clearance] of the set-up")]
+    says = f"{least_room:.3f} mm above" if least_room > 0.0 else f"{-least_room:.3f} mm below the top of"
+    lower = f", or write {key} = {math.floor(10.0 * least_room / share) / 10.0:g} under [clearance] of the set-up"
+    return [faults.warning("verify.safe_plane", f"a linking move goes aside {says} the part, the safe plane is {least:g} mm "
+                           "above it", 0, line, len(low),
+                           "let it rise there first" + (lower if least_room >= LOWEST else ""))]
 
 
 def _aside(tip: Floats, lines: list[tuple[Floats, Floats, Bools]], near: Floats) -> Bools:

@@ -9,7 +9,7 @@ import numpy as np
 from postproc.job.job import Job
 from postproc.job.places import at_place
 from postproc.path.model import FEED, TRAVERSE
-from postproc.readback.alignment.align import EndPoses, aligned, unreached
+from postproc.readback.alignment.align import EndPoses, Lost, aligned
 from postproc.readback.alignment.split_as_written import split_as_written
 from postproc.readback.comparison.approaches import leads_down
 from postproc.readback.comparison.bound_search import DeviationBound
@@ -54,7 +54,7 @@ from toolpaths.units import DEG
 @dataclass(frozen=True)
 @arrays(tip="E 3", axis="E 3", match="M", owner="E")
 class Comparison:
-    """Worst deviations (mm, rad) with the CL line and program line of each, and the poses and matching they rest on.
+    """Worst deviations (mm, rad), the CL line and program line of each, the poses and matching they rest on.
 
     Attributes:
         moves: those of the CL file, rapids split as the program splits them; `match` and `owner` count them without pecks
@@ -115,9 +115,9 @@ def compare(code: Canonical, motion: Motion, job: Job, executed: BlockPoses, gco
     ends = EndPoses(tip, axis, sweep, np.asarray(number >= 0))
     job = job.with_moves(split_as_written(motion, executed, job, ends, grain))
     moves = job.moves.without_pecks()
-    match, owner = aligned(ends, moves, moves.link, tolerance, axis_tolerance, grain)
-    lost, allowed = unreached(match), (tolerance, axis_tolerance)
-    diagnostics = [] if lost < 0 else [_not_reached(motion, moves, match, lost, (tip, axis), allowed, faults)]
+    match, owner, lost = aligned(ends, moves, moves.link, tolerance, axis_tolerance, grain)
+    allowed = tolerance, axis_tolerance
+    diagnostics = [] if lost is None else [_not_reached(motion, moves, match, lost, (tip, axis), allowed, faults)]
     bound = bound_of_blocks(motion, executed, moves, owner, allowed, job.corrects, ends=(tip, axis))
     (worst_tip, tip_line), (worst_axis, axis_line) = _farthest(motion, executed, moves, tip, axis, match, owner, tolerance,
                                                                None if job.corrects else bound.whole)
@@ -254,22 +254,24 @@ def _known_limits(most: Floats, arc: Bools, tolerance: float) -> Floats:
     return np.where(arc | ~(most[0] < tolerance) | np.isnan(most[1]), np.inf, most)
 
 
-def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: int, ends: tuple[Floats, Floats],
+def _not_reached(motion: Motion, moves: Moves, match: Ints, lost: Lost, ends: tuple[Floats, Floats],
                  allowed: tuple[float, float], faults: Faults) -> Diagnostic:
-    """No block ends at a point of the CL file; or one behind the point before has its tip there, and not its axis."""
-    x, y, z = moves.tip[lost]
-    at = int(match[lost - 1]) if lost else 0
-    last = int(motion.line[at])
-    there = at + np.flatnonzero(lengths(ends[0][at:] - moves.tip[lost]) <= allowed[0])
-    tilted = angle_between(ends[1][there], np.tile(moves.axis[lost], (len(there), 1)))
-    if len(there) and tilted.min() > allowed[1]:
+    """No block ends at a point; or the one that stands for it has its tip there, and not its axis."""
+    x, y, z = point = moves.tip[lost.move]
+    at, line = int(match[lost.move - 1]) if lost.move else 0, int(moves.line[lost.move])
+    near = at + np.flatnonzero(lengths(ends[0][at:] - point) <= allowed[0]) if lost.block < 0 else np.array([lost.block])
+    off, tilted = lengths(ends[0][near] - point), angle_between(ends[1][near], moves.axis[np.full(len(near), lost.move)])
+    row = int(tilted.argmin()) if len(near) else -1
+    if row >= 0 and tilted[row] > allowed[1] and off[row] <= allowed[0]:
         return faults.error("verify.axis", f"the program comes to the point ({x:.4f}, {y:.4f}, {z:.4f}) mm of the table "
-                            f"frame with a tool axis that is off by {tilted.min() / DEG:.6f} degrees, allowed "
-                            f"{allowed[1] / DEG:g} degrees", int(moves.line[lost]), int(motion.line[there[tilted.argmin()]]),
-                            hint="do not run this program")
-    return faults.error("verify.not_reached", f"the program never comes to the point ({x:.4f}, {y:.4f}, {z:.4f}) mm of the "
-                        "table frame", int(moves.line[lost]), last, hint="a block behind this line is missing or wrong, or "
-                        "the program is not made from this CL file with this machine, set-up and tools")
+                            f"frame with a tool axis that is off by {tilted[row] / DEG:.6f} degrees, allowed "
+                            f"{allowed[1] / DEG:g} degrees", line, int(motion.line[near[row]]), 1, "do not run this program")
+    says, hint = f"the program never comes to the point ({x:.4f}, {y:.4f}, {z:.4f}) mm of the table frame", "a block behind"
+    if lost.block >= 0:
+        says += f": this block, in its place, ends {off[0]:.6f} mm and {tilted[0] / DEG:.6f} degrees off"
+        at, hint = lost.block, "a block at or before"
+    return faults.error("verify.not_reached", says, line, int(motion.line[at]), 1, f"{hint} this line is missing "
+                        "or wrong, or the program is not made from this CL file with this machine, set-up and tools")
 
 
 def bound_of_blocks(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints, allowed: tuple[float, float],

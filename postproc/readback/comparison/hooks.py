@@ -17,8 +17,9 @@ from postproc.job.job import Job
 from postproc.readback.comparison.clamps import TURNS, cutting_rows, turned
 from postproc.readback.comparison.faults import Faults
 from postproc.readback.dialects.base import as_bytes
+from postproc.readback.dialects.readers import reader_for
 from postproc.readback.execution.execute import Motion
-from postproc.readback.text.canonical import LOADED, OFFSET, Canonical, offset_number
+from postproc.readback.text.canonical import LOADED, OFFSET, Canonical
 from postproc.readback.text.modal import codes
 from postproc.readback.text.words import lines_of
 from postproc.writing.state import NUMBER_ROOM, plain_name
@@ -195,7 +196,9 @@ class _Values:
     @cached_property
     def offsets(self) -> dict[float, str]:
         """Names of the work offsets of the places by number."""
-        return {offset_number(place.code): self.job.controller.program.offset_name(place.code) for place in self.job.places}
+        program, reader = self.job.controller.program, reader_for(self.job.controller, self.job.machine.axis_names)
+        named = [place.code for place in self.job.places]
+        return {reader.offset_of(program.offset_text(code)): program.offset_name(code) for code in named}
 
     def _near(self, line: int) -> list[str]:
         """Operations from that of the cut before a line to that of the cut behind it, "" before the first."""

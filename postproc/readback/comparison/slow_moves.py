@@ -19,10 +19,10 @@ from postproc.readback.execution.poses import BlockPoses, arc_sweeps, coordinate
 from postproc.readback.text.words import plain
 from postproc.reference.holes import Phase
 from postproc.reference.moves import Moves
-from toolpaths.arrays import Bools, Floats, Ints
+from toolpaths.arrays import Bools, Floats, Ints, repeated
 from toolpaths.dataclass import dataclass
 from toolpaths.diagnostics import Diagnostic, error
-from toolpaths.rotations import lengths
+from toolpaths.rotations import steps
 from toolpaths.toolpath import Kind
 from toolpaths.units import MM_PER_INCH
 
@@ -85,6 +85,7 @@ def check_slow(motion: Motion, executed: BlockPoses, job: Job, moves: Moves, own
     spare = np.pad(np.where(check, np.maximum(asked - total, 0.0), 0.0), 1)
     either = 2.0 * job.options.tolerance / np.where(moves.feed > 0.0, moves.feed, np.inf)
     slack = slack + np.minimum(spare[:-2] + spare[2:], either)
+    del spare, either
     share = rules.share + feed_rounding(motion, job, owner, cutting, len(moves))
     run = _runs(motion, moves, owner, cutting, check)
     # What the axes need only adds to what is allowed: it is looked at where the feed alone would not explain the time.
@@ -106,7 +107,7 @@ def check_slow(motion: Motion, executed: BlockPoses, job: Job, moves: Moves, own
 def _asked(moves: Moves, owner: Ints, cutting: Bools, tip: Floats, length: Floats) -> Floats:
     """(M,) s that the CL file asks for; moves that rounding or smoothing of their points made longer, by so much more."""
     asked = np.where(moves.seconds > 0.0, moves.seconds, length / moves.feed)
-    path = _by_move(owner, cutting, np.concatenate([[0.0], lengths(np.diff(tip, axis=0))]), len(moves))
+    path = _by_move(owner, cutting, steps(tip), len(moves))
     longer = (path > length) & (moves.phase != Phase.DRILL)
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(np.where(longer, np.where(length > 0.0, asked * path / length, path / moves.feed), asked))
@@ -164,8 +165,8 @@ def feed_rounding(motion: Motion, job: Job, owner: Ints, cutting: Bools, moves: 
 def _pecked(moves: Moves, owner: Ints, cutting: Bools, tip: Floats, length: Floats) -> Floats:
     """(M,) how often the path of a drilled hole is fed, 1 for other moves; `tip` (E, 3) at the ends of blocks."""
     if not (moves.phase == Phase.DRILL).any():
-        return np.ones(len(moves))
-    path = np.concatenate([[0.0], lengths(np.diff(tip, axis=0))])
+        return repeated(1.0, len(moves))
+    path = steps(tip)
     fed = _by_move(owner, cutting, path, len(moves))
     return np.asarray(np.fmax(np.where(moves.phase == Phase.DRILL, fed / np.fmax(length, 1e-9), 1.0), 1.0))
 
@@ -196,7 +197,7 @@ def axis_seconds(motion: Motion, executed: BlockPoses, moves: Moves, owner: Ints
 def _allowed(owner: Ints, cutting: Bools, needs: Floats, tip: Floats, seconds: Floats, asked: Floats, again: Floats,
              moves: int) -> Floats:
     """(M,) s: each block of a move its part of the time asked for, by the length of the tip's path, or what axes need."""
-    travel = np.concatenate([[0.0], lengths(np.diff(tip, axis=0))])
+    travel = steps(tip)
     whole = _by_move(owner, cutting, travel, moves)
     turning = _by_move(owner, cutting, needs, moves)
     here = np.flatnonzero(cutting)
@@ -226,7 +227,7 @@ def check_fed_rapids(motion: Motion, executed: BlockPoses, job: Job, moves: Move
                              int(motion.line[k]), len(fed), "rapid motion, or rapids_as_feed = true under [output] of the "
                              "set-up")]
     needs = _least(motion, executed, rows)
-    travel = np.concatenate([[np.inf], lengths(np.diff(tip, axis=0))])
+    travel = steps(tip, np.inf)
     feed = np.where(down & (moves.feed[m] > 0.0), moves.feed[m], np.inf)
     grain = Slack.of(job, bool((motion.unit != 1.0).any())).length
     spot = np.where(down & (moves.seconds[m] > 0.0), moves.seconds[m], 0.0)

@@ -43,7 +43,8 @@ from toolpaths.diagnostics import Diagnostic, has_errors, warning
 
 ParsedProgram = tuple[ProgramText, Structure]
 UNITS_UNSTATED = "gcode.units_unstated"
-ASSUMED = frozenset({"gcode.second_reference", "gcode.tool_name", "gcode.offset_unstated", "gcode.comparison", "gcode.skip"})
+ASSUMED = frozenset({"gcode.second_reference", "gcode.tool_name", "gcode.offset_unstated", "gcode.comparison", "gcode.skip",
+                     "gcode.iso_units"})
 """what is taken to be so where a program is timed, and refused where it is verified"""
 STOPS = (0.0, 1.0)
 """M codes of stops"""

@@ -16,13 +16,15 @@ from postproc.readback.dialects.base import M_CODES
 from postproc.readback.dialects.fanuc import MILLISECONDS, FanucReader, block, take
 from postproc.readback.dialects.iso import New
 from postproc.readback.macros.execution import MacroLanguage
-from postproc.readback.text.canonical import SMOOTH, SMOOTH_LEVEL, ProgramText
+from postproc.readback.text.canonical import OFFSET, SMOOTH, SMOOTH_LEVEL, ProgramText, offset_number
 from postproc.readback.text.flow import Call, Structure
 from postproc.readback.text.modal import GROUPS, Groups, codes
 from postproc.readback.text.words import Words
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error
 
+_AUXILIARY = tuple(range(110, 130))
+"""other names of G154 P1 to P20 (Mill Operator's Manual NGC)"""
 _LEVELS = (1.0, 2.0, 3.0)
 """P of G187: rough, medium, finish (Mill Operator's Manual NGC, G187)"""
 
@@ -31,7 +33,8 @@ class HaasReader(FanucReader):
     """G-code of Haas mills."""
 
     groups: Groups = GROUPS | {
-        "offset": (54, 55, 56, 57, 58, 59, 154), "length": (43, 49, 234), "path": (61, 64, 187), "tilt": (254, 255),
+        "offset": (54, 55, 56, 57, 58, 59, 154, *_AUXILIARY),
+        "length": (43, 49, 234), "path": (61, 64, 187), "tilt": (254, 255),
         "once": (4, 9, 28, 53), "arc_distance": ()}
     m_codes = (*M_CODES, 97.0, 98.0, 99.0)
     letters = "GMFSTHDNIJKRPQLOE"
@@ -93,7 +96,9 @@ class HaasReader(FanucReader):
 
     def others(self, words: Words, new: New, drop: Bools, line: Ints, file: str,
                found: list[Diagnostic]) -> None:
-        """Besides what Fanuc has: the words of G187."""
+        """Besides what Fanuc has: G110 to G129, the words of G187."""
+        for b, g in zip(*codes(words, "G", _AUXILIARY), strict=True):
+            new.append((int(b), OFFSET, offset_number(f"G154 P{g - _AUXILIARY[0] + 1:g}")))
         for b in codes(words, "G", (187,))[0].tolist():
             level = take(words, drop, b, "PE").get("P", 1.0)
             if level not in _LEVELS:

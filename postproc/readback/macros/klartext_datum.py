@@ -20,8 +20,15 @@ from __future__ import annotations
 
 import math
 import re
+from typing import Literal
 
 from postproc.readback.macros.expressions import MacroFault, written
+
+
+def _miscellaneous(numbers: str) -> str:
+    """Pattern of M functions as the reader of blocks takes them: blanks and zeros before the number, none before M."""
+    return rf"(?:(?<![A-Z])|(?<=FMAX))M[ \t]*0*(?:{numbers})(?!\d)"
+
 
 _CYCLE = re.compile(r"CYCL DEF 7\.(\d)[ \t]*(.*)")
 _MIRROR = re.compile(r"CYCL DEF 8\.(\d)[ \t]*(.*)")
@@ -37,20 +44,23 @@ _TURNED = re.compile(r"DR([-+])|(?<![A-Z0-9])R([LR])(?![A-Z0-9])")
 _SIDE = re.compile(r"(?<![A-Z0-9])R([LR0])(?![A-Z0-9])")
 _UNMIRRORED = re.compile(r"^/?[ \t]*(?:LP|CP|CTP|CYCL CALL (?:POS|PAT)"
                          r"|CYCL DEF (?!20[0135679]\b|240\b|32\b|32\.|7\.|8\.|10\.)\d)")
-_UNSCALED = re.compile(r"^/?[ \t]*(?:LP|CP|CTP|CYCL CALL|CYCL DEF (?!32\b|32\.|9\b|9\.)\d)|(?<![A-Z0-9])M(?:99|89)(?!\d)")
+_UNSCALED = re.compile(r"^/?[ \t]*(?:LP|CP|CTP|CYCL CALL|CYCL DEF (?!32\b|32\.|9\b|9\.)\d)|" + _miscellaneous("99|89"))
 _TRANS = re.compile(r"TRANS DATUM[ \t]+(AXIS|RESET|TABLE)\b[ \t]*(.*)")
 _STATED = re.compile(r"(I?)([XYZABCUVW])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+))")
 _MOVES = re.compile(r"/?[ \t]*(?:L|C|CC|CR|CT|CP|LP|CYCL CALL POS)\b(?!YCL DEF)")
 _ABSOLUTE = re.compile(r"(?<![A-Z0-9])([XYZABCUVW])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+))")
 _SURFACE = re.compile(r"(Q203[ \t]*=[ \t]*)([-+]?(?:\d+\.?\d*|\.\d+))")
-_MACHINE = re.compile(r"(?<![A-Z0-9])M9[12](?!\d)")
+_MACHINE = re.compile(_miscellaneous("91|92"))
 _OTHER = re.compile(r"^(?:PLANE\b|FUNCTION TCPM|CYCL DEF (?:247|19)\b|CYCL DEF 26\.|PATTERN DEF"
-                    r"|CYCL DEF 22[01]\b)|(?<![A-Z0-9])M12[89](?!\d)")
-_BEGUN = re.compile(r"^(?:PLANE (?!RESET)|FUNCTION TCPM)|(?<![A-Z0-9])M128(?!\d)")
-_ENDED = re.compile(r"^(?:PLANE RESET|FUNCTION RESET TCPM)|(?<![A-Z0-9])M129(?!\d)")
-_CALLS = re.compile(r"^CYCL CALL|(?<![A-Z0-9])M(?:99|89)(?!\d)")
+                    r"|CYCL DEF 22[01]\b)|" + _miscellaneous("128|129"))
+_BEGUN = re.compile(r"^(?:PLANE (?!RESET)|FUNCTION TCPM)|" + _miscellaneous("128"))
+_ENDED = re.compile(r"^(?:PLANE RESET|FUNCTION RESET TCPM)|" + _miscellaneous("129"))
+_CALLS = re.compile(r"^CYCL CALL|" + _miscellaneous("99|89"))
 _POLE = re.compile(r"/?[ \t]*CC\b")
 _ABOUT = re.compile(r"/?[ \t]*(?:C|CP|LP)\b")
+
+
+DatumCycle = Literal["", "cycle 8", "cycle 10", "cycle 11"]
 
 
 class DatumShift:
@@ -72,7 +82,7 @@ class DatumShift:
         self.surface, self.pole = dict[str, float](), (dict[str, float](), 0.0, 1.0)
 
     @property
-    def cycle(self) -> str:
+    def cycle(self) -> DatumCycle:
         """The one in force that changes coordinates beyond a shift, "" for none."""
         return "cycle 8" if self.mirrored else "cycle 10" if self.angle else "cycle 11" if self.scale != 1.0 else ""
 
@@ -82,6 +92,9 @@ class DatumShift:
             if m := form.fullmatch(row):
                 if m[1] != "0":
                     taken(m[2], row)
+                elif any(map(str.isdigit, m[2])):
+                    raise MacroFault("gcode.syntax", f"{row} is not read",
+                                     "write each row of the cycle as a block of its own")
                 return True
         if (m := _TRANS.fullmatch(row)) is None:
             return False
@@ -113,7 +126,7 @@ class DatumShift:
         self._alone(row, "cycle 11")
         self.scale = float(m[1])
 
-    def _alone(self, row: str, own: str) -> None:
+    def _alone(self, row: str, own: DatumCycle) -> None:
         """A cycle that turns or scales coordinates stands alone."""
         cycle = self.cycle if self.cycle != own else ""
         if under := self.other or cycle or ("R" + self.side if self.side != "0" else ""):

@@ -62,10 +62,14 @@ class SiemensMacros:
         self.modal: tuple[str, str] | None = None
 
     def judged(self) -> list[Diagnostic]:
-        """Tools whose names the set-up has not, and the order of patterns, which the control chooses."""
+        """Tools whose names the set-up has not, units of another dialect, and the order of patterns, which the control
+        chooses."""
         order = [info("gcode.hole_order", f"{name}: the holes are taken in the order that keeps travel short, from where "
                       "the tool stands, as the control chooses it", file=self.blocks.file, lines=[line])
                  for name, line in self.words.patterns.items() if name != "HOLES2"]
+        order += [warning("gcode.iso_units", f"G{code} is a code of the control's ISO dialect, taken as G{code + 50}: in "
+                          "its own language the control knows none", file=self.blocks.file, lines=[line],
+                          hint=f"write G{code + 50}") for code, line in self.words.iso_units.items()]
         return order + [warning("gcode.tool_name", f'no tool of the set-up is called "{name}": its length counts as 0',
                         file=self.blocks.file, lines=[line], hint='[tools.N] called = "..." of the set-up: the number of '
                         'the tool that the control calls so') for name, line in self.words.unknown_tools.items()]

@@ -50,6 +50,7 @@ class SiemensWords:
         self.modal_subprogram = ""
         self.codes: dict[str, int] = {}
         self.unknown_tools: dict[str, int] = {}
+        self.iso_units: dict[int, int] = {}
         self.line = 0
 
     def row(self, head: str, c: Cursor, line: int) -> RowDone:
@@ -110,6 +111,7 @@ class SiemensWords:
             take_code(self.codes, code)
             if code in (70, 71, 700, 710, 20, 21):
                 self.track.unit = 25.4 if code in (70, 700, 20) else 1.0
+                self.iso_units |= {} if code > 21 else {code: self.line}
             elif code in (90, 91):
                 self.track.absolute = code == 90
             elif code in (54, 55, 56, 57, 500, *range(505, 600)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -23,6 +24,7 @@ _NO_LETTERS = bytes(c for c in range(256) if c not in _LETTERS)
 _NEAR = 10_000
 _STRETCH = 1_000_000
 """characters that are read at a time"""
+_SIGN = re.compile(rb"\S")
 _NUMBER = np.zeros(256, dtype=bool)
 _NUMBER[list(b"0123456789.+- \t\n")] = True
 
@@ -94,14 +96,14 @@ def _behind_commas(text: bytes, groups: tuple[str, ...]) -> bytes:
 def plain(data: bytes) -> bytes:
     """Text with line feeds alone and without comments."""
     text = lines_of(data)
-    kept, done, at = [], 0, _opening(text, 0)
+    kept, whole, done, at = list[memoryview](), memoryview(text), 0, _opening(text, 0)  # copied once, when they are joined
     while at >= 0:
         match = _COMMENT.match(text, at)
         if match is not None:
-            kept.append(text[done:at])
+            kept.append(whole[done:at])
             done = match.end()
         at = _opening(text, at + 1 if match is None else done)
-    return b"".join([*kept, text[done:]]) if done else text
+    return b"".join([*kept, whole[done:]]) if done else text
 
 
 def _opening(text: bytes, at: int) -> int:
@@ -190,21 +192,24 @@ def _tape_marks(text: bytes) -> list[int]:
 
 def _without(text: bytes, starts: list[int]) -> bytes:
     """The text with empty lines in the place of some."""
-    kept, done = [], 0
+    kept, whole, done = list[memoryview](), memoryview(text), 0
     for begin in starts:
-        kept.append(text[done:begin])
+        kept.append(whole[done:begin])
         done = text.find(b"\n", begin)
-    return b"".join([*kept, text[done:]]) if starts else text
+    return b"".join([*kept, whole[done:]]) if starts else text
 
 
 def _between_blocks(text: bytes, starts: list[int]) -> list[int]:
     """Lines of % that stand between blocks, where a control stops reading."""
     if not starts:
         return []
-    ends = np.flatnonzero(np.frombuffer(text, dtype=np.uint8) == 10)
-    marks = (np.searchsorted(ends, starts) + 1).tolist()
-    first = text.count(b"\n", 0, len(text) - len(text.lstrip())) + 1
-    last = text.count(b"\n", 0, len(text.rstrip())) + 1
+    marks = [line + 1 for line in accumulate(text.count(b"\n", a, b) for a, b in pairwise([0, *starts]))]
+    begin, end = _SIGN.search(text), len(text)
+    while end and not text[max(end - _NEAR, 0):end].strip():
+        end -= _NEAR
+    end = max(end - _NEAR, 0) + len(text[max(end - _NEAR, 0):max(end, 0)].rstrip())
+    first = text.count(b"\n", 0, begin.start() if begin else len(text)) + 1
+    last = text.count(b"\n", 0, end) + 1
     return [n for n in marks if n not in (first, last)]
 
 

@@ -150,6 +150,15 @@ def test_one_line_is_rest_to_rest() -> None:
     assert least * 0.999 <= execute(commanded(q), LIMITS).seconds <= least * 1.04
 
 
+@pytest.mark.parametrize("length", [815.0, 840.0, 865.0])
+def test_a_rest_that_is_braked_for_long_keeps_the_limits(length: float) -> None:
+    """Tried again under a gentler braking curve from 0.32 s before the rest, the axis jumped onto it: 1.6 of its limit."""
+    long = ControlSettings(np.array([500.0]), np.array([400.0]), np.array([5000.0]))
+    moved = execute(commanded(np.array([[0.0], [length]]), feed=500.0), long)
+    _, acceleration, jerk = used(moved.axes().q, long.cycle, long)
+    assert acceleration <= 1.01 and jerk <= 1.5
+
+
 def test_an_exact_stop_costs_time_and_few_blocks_read_ahead_too() -> None:
     path = commanded(np.stack([np.linspace(0.0, 40.0, 41), np.zeros(41)], 1))
     free = execute(path, LIMITS).seconds

@@ -164,6 +164,15 @@ def test_what_moves_or_changes_a_state_is_refused(controller: str, block: str, p
     assert all(d.hint for d in result.diagnostics if d.severity is Severity.ERROR)
 
 
+def test_a_fault_of_hooks_and_passive_codes_names_its_file_and_line(tmp_path: Path) -> None:
+    """A code among those of the controller file had neither."""
+    (own := tmp_path / "own.toml").write_text('base = "fanuc-30i"\n[program]\npassive = [\n"M31",\n"G91"]\n')
+    (setup := tmp_path / "s.toml").write_text('[hooks]\npassive = ["M3"]\nbefore_tool = [\n"(A)",\n"M8"]\n')
+    result = postproc.convert(work(), "mill-3axis", own, setup)
+    found = [(Path(d.file).name, d.lines) for d in result.diagnostics if d.code in ("hooks.passive", "hooks.code")]
+    assert found == [("own.toml", (5,)), ("s.toml", (2,)), ("s.toml", (5,))], found
+
+
 @pytest.mark.parametrize(("controller", "block", "passive"), [
     ("fanuc-30i", "M31", ("M31",)), ("fanuc-30i", "M19 P90", ("M19",)), ("fanuc-30i", "(NOTE)", ()),
     ("siemens-840d", "CYCLE977(1)", ("CYCLE977",)), ("siemens-840d", 'MSG("HELLO")', ()),

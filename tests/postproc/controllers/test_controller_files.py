@@ -48,7 +48,7 @@ def test_show_prints_every_value_with_its_place(tmp_path: Path) -> None:
     text = CliRunner().invoke(app, ["controller", "show", str(file)]).output.splitlines()
     assert len(text) == len(controller_values(str(file))[0])
     assert [line.split() for line in text if "codes.mist" in line] == [["shop.toml:3", "codes.mist", "=", '"M73"']]
-    assert any(line.startswith("haas-ngc.toml:") and 'work_offsets.G59.1 = "G154 P1"' in line for line in text)
+    assert any(line.startswith("haas-ngc.toml:") and 'work_offsets.G110 = "G154 P1"' in line for line in text)
     assert any(line.startswith("default") and 'codes.flood = "M8"' in line for line in text)
 
 
@@ -70,7 +70,7 @@ def test_faults_name_the_line_and_what_is_allowed(tmp_path: Path) -> None:
 
 
 def test_work_offsets_are_given_for_every_code_of_a_setup(tmp_path: Path) -> None:
-    file = shop(tmp_path, 'base = "generic-iso"', "[program.work_offsets]", 'G54 = "G54"')
+    file = shop(tmp_path, 'base = "linuxcnc"', "[program.work_offsets]", 'G54 = "G54"')
     spec, found = load_controller(file)
     assert spec is None and "missing: G55, G56" in str(found[0])
 

@@ -99,6 +99,9 @@ WRONG_CALLS = {
     "a list": (lambda path: postproc.Options(units=["mm"]), "units is .'mm'.; give one of"),
     "a flag": (lambda path: postproc.Options(smooth="no"), "smooth is 'no'; give True or False"),
     "words": (lambda path: postproc.Options(allow_unknown="ABC"), "allow_unknown is 'ABC'; give a tuple of texts"),
+    "what is kept": (lambda path: postproc.convert(path, "mill-3axis", keep="some"), "keep is 'some'; give one of 'all', '"),
+    "an array as number": (lambda path: postproc.Options(tolerance=np.zeros(600)), "tolerance is an array of float64"),
+    "speeds": (lambda path: postproc.time(path, "mill-3axis", override=np.ones(3)), "override is an array of float64"),
     "a number as file": (lambda path: postproc.Options(setup=5), "setup is 5; give a text"),
 }
 

@@ -108,9 +108,9 @@ def test_a_scale_of_klartext_is_the_same_program_written_out() -> None:
     """About the datum in force: ends, increments, poles and radii, along the tool too; not the axes that turn, nor M91."""
     for body, plain in (
             (f"TRANS DATUM AXIS X+10\n{SCALE}SCL0.5\nL X+4 Y+6 Z-2 F100\nL IX+2 IZ-4\nCC X+6 Y+3\nC X+3 Y+3 DR+\n"
-             f"CR X+5 Y+3 R+1 DR-\nL Z+8 R0 FMAX M91\n{SCALE}SCL 1\nL X+1\n",
+             f"CR X+5 Y+3 R+1 DR-\nL Z+8 R0 FMAX M91\nL Z+7 FMAXM 091\nL Z+8 M91\n{SCALE}SCL 1\nL X+1\n",
              "L X+12 Y+3 Z-1 F100\nL X+13 Z-3\nCC X+13 Y+1.5\nC X+11.5 Y+1.5 DR+\nCR X+12.5 Y+1.5 R+0.5 DR-\n"
-             "L Z+8 FMAX M91\nL X+11\n"),
+             "L Z+8 FMAX M91\nL Z+7 FMAX M91\nL Z+8 M91\nL X+11\n"),
             (f"{SCALE}SCL2\nCR X+4 Y+0 R+2 DR- F100\n", "CR X+8 Y+0 R+4 DR- F100\n")):
         one, other = (good(TNC, f"BEGIN PGM A MM\nL X+0 Y+0 Z+0 R0 FMAX\n{text}L M30\nEND PGM A MM\n")
                       for text in (body, plain))
@@ -143,6 +143,7 @@ def test_a_rotation_of_klartext_is_the_same_program_written_out() -> None:
     (TNC, MIRROR + "X\nCYCL DEF 10.0 ROTATION\nCYCL DEF 10.1 ROT+9\n"),
     (TNC, MIRROR + "X\nCYCL CALL POS X+1 Y+1 Z+0 FMAX\n"),
     (TNC, SCALE + "SCL2\n" + DRILL), (TNC, DRILL + SCALE + "SCL2\nL X+1 FMAX M99\n"),
+    (TNC, DRILL + SCALE + "SCL2\nL X+1 FMAX M 099\n"), (TNC, MIRROR + "X\nL X+1 F100M0128\n"),
     (TNC, SCALE + "SCL2\n" + MIRROR + "X\n"), (TNC, SCALE + "SCL2\nTRANS DATUM RESET\n"),
     (TNC, SCALE + "SCL2\nCC X+0 Y+0\nLP PR+1 PA+0 FMAX\n"),
     (TNC, "CC X+1 Y+1\n" + SCALE + "SCL2\nL X+2 Y+1 FMAX\nC X+2 Y+1 DR+ F9\n"), (TNC, SCALE + "SCL2\nPLANE RESET STAY\n"),

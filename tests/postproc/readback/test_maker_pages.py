@@ -193,17 +193,16 @@ def test_no_built_in_file_has_passive_codes() -> None:
     assert not any(spec(name).program.passive for name in builtin_files())
 
 
-@pytest.mark.parametrize(("dialect", "second", "eighth"), [
-    (FANUC, "G55", "G54.1 P2"), (HAAS, "G55", "G154 P2"), (SIEMENS, "G55", "G506"), (NGC, "G55", "G59.2")])
-def test_names_of_work_offsets(dialect: str, second: str, eighth: str) -> None:
-    """F1: G54 to G59, then G54.1 P1; H1: G154 P1; S1: G54 to G57, then G505 (G58 and G59 are programmable
-    offsets); N: G59.1 to G59.3. The set-up counts G54 to G59, G59.1 to G59.3."""
-    names = spec(dialect).program.work_offsets
-    assert names.get("G55", "G55") == second
-    eighth = eighth if dialect in (FANUC, HAAS, NGC) else names["G59.2"]
-    assert names.get("G59.2", "G59.2") == eighth
-    if dialect == SIEMENS:
-        assert names["G58"].startswith("G5") and names["G58"] not in ("G58", "G59") and names["G59"] not in ("G58", "G59")
+@pytest.mark.parametrize(("dialect", "named", "written"), [
+    (FANUC, "G54.1 P2", "G54.1 P2"), (FANUC, "G59.1", None), (HAAS, "G154 P2", "G154 P2"), (HAAS, "G110", "G154 P1"),
+    (HAAS, "G129", "G154 P20"), (HAAS, "G130", None), (HAAS, "G59.1", None), (SIEMENS, "G57", "G57"),
+    (SIEMENS, "G58", "G505"), (SIEMENS, "G59", "G506"),
+    (SIEMENS, "G59.2", None), (TNC, "G59.3", None), (NGC, "G59.2", "G59.2"), (ISO, "G59.1", None)])
+def test_names_of_work_offsets(dialect: str, named: str, written: str | None) -> None:
+    """F1: G54 to G59, then G54.1 P1; H1: G154 P1, G110 to G129 are P1 to P20; S1: G54 to G57, then G505 (G58 and G59 are
+    programmable offsets); N: G59.1 to G59.3."""
+    program = spec(dialect).program
+    assert program.offset_block("G55") is not None and program.offset_block(named) == written
 
 
 def test_names_of_work_offsets_on_a_tnc() -> None:

@@ -37,7 +37,7 @@ def test_a_small_program_is_not_moved_fraction_by_fraction(machine: str, control
     monkeypatch.setattr(BlockPoses, "look_ahead", looked)
     result = postproc.convert(few_sides("five_faces.cls"), machine, controller, options=Options(setup=SETUP))
     assert result.ok
-    assert made["ahead"] > 3
+    assert made["ahead"] >= 3
     assert made["alone"] <= 6
 
 

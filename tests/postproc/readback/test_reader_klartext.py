@@ -166,7 +166,8 @@ def test_labels_behind_the_end_and_other_files() -> None:
 
 @pytest.mark.parametrize(("block", "code"), [
     ("CYCL DEF 26.0 SCALING", "gcode.not_executed"), ("CYCL DEF 19.0 TILT", "gcode.cycle"),
-    ("CYCL DEF 10.1 9", "gcode.syntax"), ("CYCL DEF 11.1 SCL0", "gcode.syntax"), ("CYCL DEF 8.1 Z", "gcode.mode"),
+    ("CYCL DEF 10.1 9", "gcode.syntax"), ("CYCL DEF 11.1 SCL0", "gcode.syntax"),
+    ("CYCL DEF 11.0 SCALING ~\n11.1 SCL 0.5", "gcode.syntax"), ("CYCL DEF 8.1 Z", "gcode.mode"),
     ("FN 18: Q1 = 5", "gcode.expression"), ("L X+Q1", "gcode.variable"),
     ("RND R5", "gcode.not_executed"), ("CHF 2", "gcode.not_executed"), ("APPR LT X+1 Y+1 LEN5", "gcode.not_executed"),
     ("CT X+1 Y+1", "gcode.not_executed"), ("FL X+1", "gcode.not_executed"), ("L X+1 M126", "gcode.rollover"),

@@ -428,9 +428,18 @@ def test_the_unit_of_a_file_that_states_none_is_asked_for(tmp_path: Path, monkey
     assert "unit of the CL file" not in run(*words).output, "answers of a file hold values alone"
     monkeypatch.setattr("postproc.cli.setup_new._terminal", lambda: True)
     said = run(*words, stdin="cm\ninch\n")
-    assert "'cm' is not one of mm, inch" in said.stderr and "1 question\n" in said.stdout
+    assert "'cm' is not one of mm, inch" in said.stderr and "1 question asked\n" in said.stdout
     assert "--units inch" in said.stdout and "answered (--units inch" in out.read_text()
-    assert "unit of the CL file" not in run(*words, "--units", "mm").output + run(*words, "--yes").output
+    made = run("convert", file, *words[3:5], "-c", "linuxcnc", "--setup", out, "--units", "inch", "-o", tmp_path / "p.nc")
+    program = (tmp_path / "p.nc").read_text()
+    assert "G21" in program and "CL file read with --units inch" in program and "(units inch" not in program
+    assert "program in mm, CL file in inch" in made.stdout, "the header named inches above a program in mm"
+    silent = run(*words, "--units", "mm").output + (said := run(*words, "--yes").output)
+    assert "unit of the CL file" not in silent and "0 questions asked\n" in said
+    file.write_text(file.read_text().replace("FEDRAT/20", "FEDRAT/20,IPM"))
+    assert "[inch]" in run(*words, stdin="\n").stderr and "--units inch" in out.read_text(), "offered is what was read"
+    run(*words, "--yes")
+    assert "inch, ASSUMED: its feeds are in inches; where its lengths are in mm, write" in out.read_text()
 
 
 def test_nobody_is_asked_for_what_no_answer_puts_right(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

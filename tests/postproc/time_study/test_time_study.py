@@ -14,7 +14,7 @@ from typer.testing import CliRunner, Result
 from postproc.cli.app import app
 from postproc.cycle_time.blocks import MotionBlocks
 from postproc.cycle_time.estimate import Estimate, estimate, timed, total
-from postproc.cycle_time.shares import shares
+from postproc.cycle_time.shares import operations, shares
 from postproc.time_study.side_by_side import names, short
 from postproc.time_study.tables import by_tool
 from postproc.time_study.time_figure import along_path, time_figure
@@ -65,6 +65,10 @@ def test_the_table_by_tool_is_the_program() -> None:
     assert sum(float(str(row["time_s"])) for row in rows) == pytest.approx(e.seconds, rel=1e-6)
     change = machine("mill-3axis", timing=True).timing.tool_change
     assert float(str(rows[1]["time_s"])) == pytest.approx(2.5 + change, abs=1.0)
+    same = operations(e, shares(e))
+    assert [row["operation"] for row in same] == ["T1", "T2"]
+    assert [row["tool_change_s"] for row in same] == pytest.approx([change, change], abs=0.1), "both were those of T1"
+    assert [row["time_s"] for row in same] == pytest.approx([row["time_s"] for row in rows])
 
 
 def test_cuts_count_by_the_tip_on_the_part_whatever_the_words_are() -> None:

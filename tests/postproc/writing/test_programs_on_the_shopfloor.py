@@ -21,7 +21,7 @@ from tests.postproc.program_kit import command, lines, program, step
 GOLDEN = Path(__file__).parents[2] / "golden"
 CONTROLLERS = ("fanuc-30i", "haas-ngc", "siemens-840d", "heidenhain-tnc640")
 MACHINE = {"haas-ngc": "trunnion-bc"}
-OWN_OFFSET = {"fanuc-30i": "G54.1 P3", "haas-ngc": "G154 P3", "siemens-840d": "G509", "heidenhain-tnc640": "datum number 9"}
+OWN_OFFSET = {"fanuc-30i": "G59", "haas-ngc": "G59", "siemens-840d": "G506", "heidenhain-tnc640": "datum number 6"}
 
 
 def setup(code: str = "G54", **output: object) -> SetupFile:
@@ -111,7 +111,7 @@ def test_no_comment_holds_the_end_of_the_file(controller: str) -> None:
 
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_the_work_offset_is_named_as_the_control_names_it(controller: str) -> None:
-    result = three_laws(controller, setup("G59.3"))
+    result = three_laws(controller, setup("G59"))
     head = next(line for line in result.text.splitlines() if "IN MACHINE" in line.upper())
     assert f"WORK OFFSET {OWN_OFFSET[controller].upper()} IN MACHINE" in head.upper()
     assert f"work offset {OWN_OFFSET[controller]}: X" in as_text(result, "a.nc")

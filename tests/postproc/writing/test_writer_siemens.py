@@ -51,7 +51,7 @@ def test_tcp_states_the_work_offset_and_linear_rotary_axes() -> None:
 
 
 def test_programmable_offsets_are_not_taken_for_settable_ones() -> None:
-    for code, settable in (("G57", "G57"), ("G58", "G505"), ("G59", "G506"), ("G59.1", "G507")):
+    for code, settable in (("G57", "G57"), ("G58", "G505"), ("G59", "G506")):
         text = lines("siemens-840d", program([step("rapid", X=0.0)]), work_offset=code)
         assert text[2] == f"N20 {settable}"
 

@@ -113,6 +113,15 @@ def test_a_number_to_select_alone_is_no_tool() -> None:
     assert not errors(read_bytes(text, allow_unknown=["SELECT"]))
 
 
+def test_a_record_of_a_known_word_whose_form_is_allowed_is_executed_as_it_stands() -> None:
+    """--help, `explain` and the manual said that it is left out."""
+    text = f"{HEADS['generic']}SPINDL/100,200,CLW\nRAPID\nGOTO/1,2,30\nWIGGLE/3\n"
+    assert errors(read_bytes(text)) == ["cl.form", "cl.unknown-word"]
+    result = read_bytes(text, allow_unknown=["SPINDL", "WIGGLE"])
+    assert not errors(result) and (100.0, 200.0, "CLW") in {e.values for e in result.toolpath.events}
+    assert "WIGGLE" not in {e.word for e in result.toolpath.events} and result.toolpath.records.dropped == 0
+
+
 def cycle(words: str) -> Cycle:
     return path(f"catia CYCLE/{words}", "CYCLE/OFF\n").cycles[0]
 
