@@ -123,7 +123,7 @@ def test_the_second_witness_counts_each_peck(monkeypatch: pytest.MonkeyPatch) ->
     testify = witnessing.testify
 
     def smaller(case: Case, executed: object) -> object:
-        return testify(replace(case, cl=case.cl.replace(b"SUBPECK,3.0", b"SUBPECK,2.0")), executed)
+        return testify(replace(case, cl=lambda: case.cl().replace(b"SUBPECK,3.0", b"SUBPECK,2.0")), executed)
     monkeypatch.setattr(witnessing, "testify", smaller)
     said, _ = witnessing.second_witness(result.source, result.asked or result.setup, result.options, result.job,
                                         result.comparison, result.text)
