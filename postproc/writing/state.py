@@ -112,18 +112,23 @@ class WriterState:
         return [mode for law, mode in modes.items() if mode is not None and law in laws]
 
     def length_alone(self) -> bool:
-        """True where a length register changes in a block that states no height: where a mode takes it or ends it so, in a
-        safe start that does not go home, at a tool change away from home, and in blocks of G43 of their own."""
+        """True where a length register changes in a block without a height: by modes, a start or a change away from home."""
         p, rules = self.program, self.controller.tools
         modes = [(section, mode) for section in p.sections if (mode := self.mode_of(section)) is not None]
         taken = any("{register}" in block for _, mode in modes for block in mode.enter)
-        open_in = {section.first for old, section in pairwise(p.sections) if old.law == "axes" and math.isnan(section.into)}
-        alone = any(mode.length == "off" and (math.isnan(section.out) or section.first in open_in)
-                    for section, mode in modes)
+        open_in = {section.first for old, section in pairwise(p.sections)
+                   if old.law == "axes" and math.isnan(section.into) and self._takes_length(old.first, section.first)}
+        alone = any(mode.length == "off" and (math.isnan(one.out) or one.first in open_in) for one, mode in modes)
         start = not self.goes_home(0) and any(mode.lifted for _, mode in modes)
         changes = [k for k, commands in p.commands.items() if any(c.name == "CHANGE_TOOL" for c in commands)]
         away = not rules.length_with_z or any(k == 0 or not self.goes_home(k - 1) for k in changes)
         return taken or alone or start or (self.length_offsets and away)
+
+    def _takes_length(self, first: int, last: int) -> bool:
+        """True where blocks of machine coordinates, `first` to before `last`, state Z behind the last one that goes home."""
+        p = self.program
+        behind = ~np.logical_or.accumulate((p.home & ~p.skip)[first:last][::-1])[::-1]
+        return "Z" in p.letters and bool(p.write[first:last, p.letters.index("Z")][behind].any())
 
     def restate(self) -> None:
         """State motion code and feed with the next block."""
@@ -337,8 +342,7 @@ class WriterState:
             yield self.controller.codes.length_offset.format(register=self.register)
 
     def without_length(self, height: float = math.nan) -> str:
-        """The block that takes the length off: with the Z at which the tool then stands, so that it is right whether or not
-        the code moves by itself; alone where that is not known."""
+        """The block that takes the length off, with the Z that makes it right however it moves; alone without one."""
         codes, self.length_off = self.controller.codes, True
         if math.isnan(height):
             return codes.length_cancel

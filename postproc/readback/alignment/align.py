@@ -85,7 +85,7 @@ def _found_again(tip: Floats, axis: Floats, moves: Moves, lost: int, start: int,
     for after in range(lost + 1, min(lost + 1 + MOVES_AHEAD, len(moves))):
         there = np.flatnonzero(np.maximum(*apart(after)) <= 1.0)
         if len(there):
-            before = sum(apart(lost))[:there[0]]
+            before = np.add(*apart(lost))[:there[0]]
             block = int(before.argmin()) if len(before) else -1
             return (start + block if block >= 0 else -1), start + block + 1
     return None

@@ -163,7 +163,7 @@ def test_distance_of_the_setup_is_where_the_tool_leaves_to() -> None:
         for asked in ({"distance": 125.0}, {"distance": None, "margin": 1250.0}):  # of a margin a tenth at least
             assert found_under(result, **asked) == {"verify.safe_plane"}
         assert result.job is not None
-        high = replace(result.job.space, centres=result.job.space.centres + [0.0, 0.0, 500.0])
+        high = replace(result.job.space, centres=result.job.space.centres + np.array([0.0, 0.0, 500.0]))
         low, = read_back(result.text, replace(result.job, space=high), "test.apt", gcode="p.nc")[1]
         assert "below the top of the part" in low.message and low.hint == "let it rise there first", "no distance is offered"
 
