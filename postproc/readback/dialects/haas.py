@@ -23,7 +23,7 @@ from postproc.readback.text.words import Words
 from toolpaths.arrays import Bools, Ints
 from toolpaths.diagnostics import Diagnostic, error
 
-_AUXILIARY = tuple(range(110, 130))
+_AUXILIARY = tuple(g for g in range(110, 130) if g not in (112, 113))
 """other names of G154 P1 to P20 (Mill Operator's Manual NGC)"""
 _LEVELS = (1.0, 2.0, 3.0)
 """P of G187: rough, medium, finish (Mill Operator's Manual NGC, G187)"""
@@ -96,9 +96,9 @@ class HaasReader(FanucReader):
 
     def others(self, words: Words, new: New, drop: Bools, line: Ints, file: str,
                found: list[Diagnostic]) -> None:
-        """Besides what Fanuc has: G110 to G129, the words of G187."""
+        """Besides what Fanuc has: G110 to G129 but for G112 and G113, the words of G187."""
         for b, g in zip(*codes(words, "G", _AUXILIARY), strict=True):
-            new.append((int(b), OFFSET, offset_number(f"G154 P{g - _AUXILIARY[0] + 1:g}")))
+            new.append((int(b), OFFSET, offset_number(f"G154 P{g - 109:g}")))
         for b in codes(words, "G", (187,))[0].tolist():
             level = take(words, drop, b, "PE").get("P", 1.0)
             if level not in _LEVELS:

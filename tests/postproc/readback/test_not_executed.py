@@ -16,7 +16,7 @@ REFUSED = (
     ("siemens-840d", SIN, ("ANG=30", "X10 CHF=2", "X10 CHR=2", "X10 RND=2", "RNDM=2", "R1=$P_UIFR[1,X,TR]", "DEF FRAME M1",
                            "$P_UIFR[1]=CTRANS(X,1)", "$P_PFRAME=CROT(Z,45)", "SUBP(1)\nM30\nPROC SUBP(REAL A)")),
     ("fanuc-30i", ISO, ("X10. ,C2.", "X10. ,R2.", "X5. ,A30.")),
-    ("haas-ngc", ISO, ("G101 X0.", "G47 P0 X0. Y0. J10.", "G12 I5.", "G150 X0. Y0. P5")),
+    ("haas-ngc", ISO, ("G101 X0.", "G47 P0 X0. Y0. J10.", "G112", "G12 I5.", "G150 X0. Y0. P5")),
     ("heidenhain-tnc640", TNC, ("CYCL DEF 26.0 AXIS-SPEC. SCALING", "RND R2",
                                 "CHF 2", "APPR LT X+0 Y+0 LEN5 RL", "DEP LT LEN5", "FL X+5")))
 

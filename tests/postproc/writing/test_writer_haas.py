@@ -43,4 +43,4 @@ def test_smoothing_states_the_corner_rounding_and_is_taken_back() -> None:
 
 
 def test_further_work_offsets_are_g154() -> None:
-    assert "G154 P3" in lines("haas-ngc", program([step("rapid", X=0.0)]), work_offset="G112")
+    assert "G154 P5" in lines("haas-ngc", program([step("rapid", X=0.0)]), work_offset="G114")
