@@ -101,7 +101,7 @@ class RodLoop:
         """(K,) mm: |e| of each leg, the same at every tilt that is reached."""
         if not len(self.arms):
             return np.zeros(self.arms.shape[1])
-        return np.nan_to_num(np.fmax.reduce(np.linalg.norm(self._along, axis=2), axis=0))
+        return np.asarray(np.nan_to_num(np.fmax.reduce(np.linalg.norm(self._along, axis=2), axis=0)), dtype=np.float64)
 
     @cached_property
     def _lever(self) -> float:

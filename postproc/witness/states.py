@@ -229,7 +229,7 @@ def _coolants(c: Commanded, setup: dict[str, Any]) -> Array:
     begin = loads(tool)
     later = np.isin(begin, begin[~silent & (c.flowed >= begin) & (c.coolant != 0)])
     others = ~later & (silent | ((c.flowed < begin) & (c.coolant != UNFOLLOWED)))
-    for number in np.unique(tool[np.isin(tool, list(own)) | bool(default)]).tolist():
+    for number in sorted(set(tool[np.isin(tool, list(own)) | bool(default)].tolist())):
         word = own.get(number) or default
         taken = (tool == number) & ((number in own) | silent | (c.coolant == 0))
         result[taken & others] = {"off": 0, "flood": 1, "mist": 11, "through": 12, "air": 13}.get(str(word), 2)

@@ -68,9 +68,8 @@ FAULTS = (
           "pieces = arcs if 0 < len(arcs) < len(chords) else [(x, y, z, ()) for x, y, z in chords.tolist()]",
           "pieces = [(x, y, z, ()) for x, y, z in control]", ("plane spline",)),
     Fault("last feed not taken", "reader", "fedrat",
-          "b.feed.set(b.row, feed_in(numbers[0] if value is None else value, unit, b.scale))",
-          "b.feed.set(b.row, feed_in(numbers[0] if value is None else value, unit, b.scale)) if "
-          "b.row < 5 else None"),
+          "b.feed.set(b.row, feed_in(value, unit, b.scale))",
+          "b.feed.set(b.row, feed_in(value, unit, b.scale)) if b.row < 5 else None"),
     Fault("MSYS ignored", "frames", "set_system", "b.here = (matrix, origin)", "b.here = (np.eye(3), 0.0 * origin)"),
     Fault("MSYS transposed", "frames", "set_system", "b.here = (matrix, origin)", "b.here = (matrix.T, origin)"),
     Fault("MSYS without its origin", "frames", "set_system", "b.here = (matrix, origin)",

@@ -127,7 +127,8 @@ def test_header_is_enough_to_verify_again(tmp_path: Path) -> None:
     head = "\n".join(n for n in out.read_text().splitlines() if n.startswith("("))
     machine, controller = re.search(r"\(machine (\S+)\)", head)[1], re.search(r"\(controller (\S+)\)", head)[1]
     tolerance, axis = re.search(r"tolerance ([\d.]+) mm, axis tolerance ([\d.]+)", head).groups()
-    setup, units = re.search(r"\(setup (\S+), fingerprint ", head)[1], re.search(r"\(units (\S+)\)", head)[1]
+    setup = re.search(r"\(setup (\S+), fingerprint ", head)[1]
+    units = re.search(r"\(CL file read with --units (\S+)\)", head)[1]
     again = run("verify", out, path, "-m", machine, "-c", controller, "--setup", Path(TOOLS).with_name(setup), "--tolerance",
                 tolerance, "--axis-tolerance", axis, "--units", units)
     assert again.exit_code == 0 and again.stdout.startswith("proved")

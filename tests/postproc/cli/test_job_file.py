@@ -87,7 +87,7 @@ def test_hooks_of_the_job_hold_under_those_of_the_set_up_and_are_part_of_the_pro
     own.write_text('[hooks]\nafter_tool = ["M34"]\npassive = ["M34", "M32"]\n')
     assert run("convert", part, "-o", out, "--hooks", own).exit_code == 0 and "M34" in out.read_text()
     own.write_text('[hooks]\nafter_tool = ["G91"]\npassive = ["M32"]\n')
-    assert f"{own}: error [hooks.code]" in run("convert", part, "-o", out, "--hooks", own).stderr
+    assert f"{own}:2: error [hooks.code]" in run("convert", part, "-o", out, "--hooks", own).stderr
     job.write_text(JOB + "hooks = true\n")
     assert "hooks" in run("convert", part, "-o", out).stderr
 
