@@ -226,11 +226,14 @@ class Machine:
         """What `moves_along_tool` has found, by joint."""
         return {}
 
-    def drive_count(self) -> int:
-        """Joints that are not rotary axes outside the legs."""
-        legs = self.kinematics.leg_geometry
+    def joints_over_workspace(self, platform: Floats) -> Floats:
+        """Joints (N, J) at places and tilts (N, 4) of the platform of a machine on legs, rotary axes outside the legs at 0;
+        NaN where a leg does not reach."""
+        legs, over = self.kinematics.leg_geometry, self.kinematics.over_workspace
+        assert over is not None
         own = 0 if legs is None else len(legs.names) + len(legs.carrier_names)
-        return own or int((~np.array(self.rotary)).sum())
+        drives = own or int((~np.array(self.rotary)).sum())
+        return over.joints_at(platform, np.zeros((len(platform), len(self.axis_names) - drives)))
 
     def _places(self) -> Floats:
         """Joints (N, J) all over the travel, a turn of axes that go round, and home."""

@@ -324,7 +324,7 @@ def _platform(machine: Machine) -> Iterator[KeyProblem]:
         return
     place, tilt = over.workspace.grid(PLACES)
     places = np.vstack([[*over.workspace.middle, np.clip(0.0, *over.workspace.tilt)], np.column_stack([place, tilt])])
-    q = over.joints_at(places, np.zeros((len(places), len(machine.axis_names) - machine.drive_count())))
+    q = machine.joints_over_workspace(places)
     margins, names = reach(machine.kinematics, machine.home[None]), machine.axis_names
     faces = [(name, value) for name, value, own in zip(margins.names, margins.values[0], margins.of_box, strict=True)
              if own and not value >= 0.0]

@@ -55,8 +55,7 @@ def least_margins(machine: Machine) -> dict[str, dict[str, Any]]:
     if over is None:
         return {}
     place, tilt = over.workspace.grid(GRID)
-    turn = np.zeros((len(place), len(machine.axis_names) - machine.drive_count()))
-    q = over.joints_at(np.column_stack([place, tilt]), turn)
+    q = machine.joints_over_workspace(np.column_stack([place, tilt]))
     known = np.isfinite(q).all(axis=1)
     if not known.any():
         return {}
@@ -81,8 +80,7 @@ def extents(machine: Machine) -> dict[str, Any]:
     if over is None or legs is None:
         return {}
     place, tilt = over.workspace.grid(GRID)
-    turn = np.zeros((len(place), len(machine.axis_names) - machine.drive_count()))
-    q = over.joints_at(np.column_stack([place, tilt]), turn)
+    q = machine.joints_over_workspace(np.column_stack([place, tilt]))
     feet = kinematics.rig(q[np.isfinite(q).all(axis=1)]).carriages
     if not len(feet):
         return {}

@@ -44,11 +44,12 @@ def sections_of(job: Job, moves: Moves, path: JointPath, new: Ints) -> tuple[Sec
 def _out(job: Job, moves: Moves, path: JointPath, end: int) -> float:
     """`Section.out` of a section that ends with block `end`."""
     machine, letters = job.control.machine, job.control.machine.axis_names
-    axis, z, up = machine.retract_axis, letters.index("Z"), np.stack([path.q[end], path.q[end]])
+    axis = machine.retract_axis
     if axis < 0 or end + 1 >= len(path) or not path.home[end + 1] or not path.state[end + 1, axis]:
         return float("nan")
+    up = np.stack([path.q[end], path.q[end]])
     up[1, axis] = machine.home[axis] - BELOW_HOME * np.sign(machine.home[axis] - path.q[end, axis])
-    tool = block_tools(path, moves)
+    tool, z = block_tools(path, moves), letters.index("Z")
     below, above = unrounded_words(path, up, np.array([end, end]), tool, job.kinematics, job.offset_length)
     travel = np.abs(above - below)
     travel[z] -= abs(up[1, axis] - up[0, axis])
